@@ -94,7 +94,7 @@ class Pairs(Generic[W]):
         scores = []
         for name, same in groupby(self.pairs, key=lambda pair: self.name_of(pair[0])):
             pairs = list(same)
-            shares = PairShares.mean(map(self._shares, pairs))
+            shares = PairShares.mean(map(self.shares, pairs))
             scores.append(PairScore(*name, self.cluster_of(pairs[0][0]), shares))
         return scores
 
@@ -111,7 +111,7 @@ class Pairs(Generic[W]):
 
     def net(self, pairs: Sequence[tuple[W, W]]) -> Rate:
         """Return the net pairs of some of them, each repetition by itself."""
-        return net_pairs(list(map(self._shares, pairs)), self._clusters(pairs))
+        return net_pairs(list(map(self.shares, pairs)), self._clusters(pairs))
 
     def mean(self, value: Callable[[W, W], float], of: Sequence[tuple[W, W]] | None = None) -> Rate:
         """Return the mean of a value of both worlds, over the pairs or some of them."""
@@ -131,7 +131,8 @@ class Pairs(Generic[W]):
         """Return whether the answer in just one of both worlds is."""
         return self.is_right(one) != self.is_right(other)
 
-    def _shares(self, pair: tuple[W, W]) -> PairShares:
+    def shares(self, pair: tuple[W, W]) -> PairShares:
+        """Return whether both worlds of a pair are right, and whether both are exchanged."""
         are_exchanged = all(map(self.is_exchanged, pair))
         return PairShares(float(self.are_right(*pair)), float(are_exchanged))
 

@@ -33,7 +33,7 @@ class ComparedFrame(msgspec.Struct, array_like=True, frozen=True):
 
 
 class PairedQuestion(msgspec.Struct, frozen=True, omit_defaults=True):
-    """A question with another answer in each world.
+    """A question with another answer in each world; of a placebo, with the same in both.
 
     Attributes:
         text: the question.
@@ -46,6 +46,7 @@ class PairedQuestion(msgspec.Struct, frozen=True, omit_defaults=True):
             it in that world.
         absence: True where the answer is that something is nowhere, for each world.
         overlap: strict score of each world's answer as a reply in the other.
+        moment: frame after which it is asked; None for the end.
     """
 
     text: str
@@ -57,6 +58,12 @@ class PairedQuestion(msgspec.Struct, frozen=True, omit_defaults=True):
     own_clues: tuple[tuple[int, ...], tuple[int, ...]]
     absence: tuple[bool, bool]
     overlap: tuple[float, float]
+    moment: int | None = None
+
+    @property
+    def is_placebo(self) -> bool:
+        """True if its answer is the same in both worlds, whose frames differ all the same."""
+        return self.answers[0] == self.answers[1]
 
 
 class TwinPair(msgspec.Struct, frozen=True):
@@ -90,6 +97,17 @@ class TwinPair(msgspec.Struct, frozen=True):
     types: tuple[str, ...]
     frames: tuple[ComparedFrame, ...]
     questions: tuple[PairedQuestion, ...]
+
+    @property
+    def tells_worlds(self) -> bool:
+        """True if a question has another answer in each world."""
+        return not all(question.is_placebo for question in self.questions)
+
+    def evidence(self, moment: int | None) -> int | None:
+        """Return the newest frame up to a moment, or to the end, that differs; None without any."""
+        end = len(self.frames) if moment is None else moment + 1
+        differing = (at for at, frame in enumerate(self.frames[:end]) if not frame.same)
+        return max(differing, default=None)
 
 
 class TwinPlace(msgspec.Struct, frozen=True):

@@ -64,8 +64,10 @@ class TwinSide(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
             made.
         n_differing: number of these that differ between the worlds; likewise.
         n_after_clues: number of shown frames after the last clue; likewise.
-        n_since_change: number of frames of the trajectory since the changed objects were last
-            changed by the agent; None if it left them as they were at the start.
+        age: number of frames from the newest evidence, a frame of the trajectory that differs, to
+            the one at which it is asked; None if none differs.
+        span: number of frames from its oldest clue to the one at which it is asked.
+        length: number of frames of the trajectory up to that one.
         scores: what the reply scores in the other world, by the task's own metrics; empty for ours,
             which `answers` tell.
     """
@@ -78,7 +80,9 @@ class TwinSide(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     n_frames: Count | None
     n_differing: Count | None
     n_after_clues: Count | None
-    n_since_change: Count | None
+    age: Count | None = None
+    span: Count | None = None
+    length: Count | None = None
     scores: dict[str, Number] = {}
 
 

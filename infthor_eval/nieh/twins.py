@@ -1,4 +1,4 @@
-"""Questions of twins in a set: what each is paired with, and how long ago that last changed."""
+"""Questions of twins in a set: what each is paired with, and how old their evidence is."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
@@ -6,7 +6,7 @@ from functools import lru_cache
 from infthor_eval.errors import DataError
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
-from infthor_eval.formats.step_log import ObjectState, iter_object_states, read_steps
+from infthor_eval.formats.twins import TwinPair
 from infthor_eval.nieh.contexts.base import QuestionVariant
 from infthor_eval.nieh.records import TwinSide
 from infthor_eval.nieh.samples import TaskSamples
@@ -62,8 +62,16 @@ def _side(
         n_frames=None if shown is None else len(shown),
         n_differing=n_differing,
         n_after_clues=n_after_clues,
-        n_since_change=_frames_since_change(data, question.traj_id),
+        **_ages(pair, question, min(clues)),
     )
+
+
+def _ages(pair: TwinPair, question: Question, oldest: int) -> dict[str, int | None]:
+    """Return age, span and length of a question whose oldest clue is at a position (`TwinSide`)."""
+    last = len(pair.frames) - 1 if question.moment is None else question.moment
+    evidence = pair.evidence(last)
+    age = None if evidence is None else last - evidence
+    return {"age": age, "span": max(0, last - oldest), "length": last + 1}
 
 
 def _other(data: NiehSet, question: Question) -> Question:
@@ -83,30 +91,3 @@ def _by_pair(data: NiehSet) -> Mapping[str, Sequence[Question]]:
     for question in data.questions:
         by_pair.setdefault(question.pair, []).append(question)
     return by_pair
-
-
-@lru_cache(maxsize=1024)
-def _frames_since_change(data: NiehSet, traj_id: str) -> int | None:
-    """Return the number of frames since the agent last changed one of the objects that differ."""
-    if not data.has_frames:
-        return None
-    pair = data.twins[traj_id]
-    ids = pair.changed
-    if traj_id == pair.traj_ids[1]:
-        ids = tuple(pair.ids.get(key, key) for key in ids)
-    steps = sorted(read_steps(data.folder(traj_id)), key=lambda step: step.img_idx)
-    before: list[tuple[object, ...]] = []
-    last = None
-    for number, states in enumerate(iter_object_states(steps)):
-        now = [_what_is_asked(states.get(key)) for key in ids]
-        if number and now != before:
-            last = number
-        before = now
-    return None if last is None else len(steps) - 1 - last
-
-
-def _what_is_asked(state: ObjectState | None) -> tuple[object, ...]:
-    """Return what questions ask of an object's state."""
-    if state is None:
-        return ()
-    return state.parents, state.held, state.exists, state.is_open, state.is_sliced

@@ -70,7 +70,6 @@ def make_twins(
             n_frames=n_frames,
             n_differing=1,
             n_after_clues=n_frames - 1,
-            n_since_change=None,
         )
         clues = ShownClues(n_shown=1, n_clues=1, n_after=n_after)
         about = {"id": f"{base}-{world}/{number}", "cluster": base, "twin": twin}

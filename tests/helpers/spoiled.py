@@ -144,7 +144,9 @@ def _nieh() -> tuple[RunHeader, UnitRecord[NiehAnswer]]:
         n_frames=3,
         n_differing=1,
         n_after_clues=1,
-        n_since_change=2,
+        age=2,
+        span=2,
+        length=9,
     )
     record = make_record(
         0,

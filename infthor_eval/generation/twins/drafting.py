@@ -9,15 +9,17 @@ import shutil
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 
 import msgspec
+from msgspec.structs import replace
 
 from infthor_eval.formats.object_ids import object_type_of
 from infthor_eval.formats.shared_frames import store_picture, write_frame_names
 from infthor_eval.formats.step_log import ObjectInFrame, Step, read_steps
 from infthor_eval.formats.trajectory import Trajectory, encode_trajectory
-from infthor_eval.formats.twins import PairedQuestion, TwinPair
+from infthor_eval.formats.twins import ComparedFrame, PairedQuestion, TwinPair
 from infthor_eval.generation.replay import replay
 from infthor_eval.generation.twins.comparison import Difference, World, compare
 from infthor_eval.generation.twins.episode import Episode, read_episode
@@ -30,6 +32,7 @@ from infthor_eval.generation.twins.pairing import (
 )
 from infthor_eval.generation.twins.pictures import are_clearly_unlike
 from infthor_eval.generation.twins.rewriting import without_traces
+from infthor_eval.generation.twins.rungs import ladders, that_stay
 from infthor_eval.generation.twins.tolerance import tolerance_of
 from infthor_eval.household.wording import canonical_type
 from infthor_eval.storage.digests import digest, digest_of_file
@@ -49,11 +52,14 @@ class TwinSettings(msgspec.Struct, frozen=True):
         seed: seed of all that is drawn.
         per_kind: twins with questions of one kind and trajectory, at most; twice as many are
             proposed.
+        rungs: numbers of frames since the evidence at which questions are asked, ascending; none
+            for the end of the episode.
     """
 
     kinds: tuple[str, ...]
     seed: int = 0
     per_kind: int = 2
+    rungs: tuple[int, ...] = ()
 
 
 class TwinDraft(msgspec.Struct):
@@ -177,7 +183,7 @@ class _Maker:
             except (EditRefused, Difference) as error:
                 rejected[str(error)] = rejected.get(str(error), 0) + 1
             else:
-                pairs += [pair] if pair.questions else []
+                pairs += [pair] if pair.tells_worlds else []
         if n_proposed:
             self._draft.proposed[name] = n_proposed
         if rejected:
@@ -206,7 +212,7 @@ class _Maker:
             AskedWorld(second.steps, worlds.changed_in_second, seed),
         )
         check_original(worlds.has_own, self._episode.history.steps, *asked)
-        questions = pair_questions(asked, worlds.types, self._score)
+        questions = self._ask(asked, worlds, frames)
         names = name_worlds(self._draft.rooms, pair_id)
         pair = TwinPair(
             id=pair_id,
@@ -222,9 +228,29 @@ class _Maker:
             frames=frames,
             questions=tuple(one for one in questions if is_shown(one, worlds, first, second)),
         )
-        if pair.questions:
+        if pair.tells_worlds:
             self._write(worlds, pair, replays)
         return pair
+
+    def _ask(
+        self,
+        asked: tuple[AskedWorld, AskedWorld],
+        worlds: Worlds,
+        frames: Sequence[ComparedFrame],
+    ) -> list[PairedQuestion]:
+        """Return the questions at the end; or those at the rungs of ladders, and placebos."""
+        rungs = self._draft.settings.rungs
+        if not rungs:
+            return pair_questions(asked, worlds.types, self._score)
+        differing = {at for at, frame in enumerate(frames) if not frame.same}
+
+        def ask_at(moment: int) -> list[PairedQuestion]:
+            until = asked[0].until(moment), asked[1].until(moment)
+            found = pair_questions(until, worlds.types, self._score, differing)
+            return [replace(question, moment=moment) for question in found]
+
+        of_ladders = (that_stay(list(map(ask_at, ladder))) for ladder in ladders(frames, rungs))
+        return list(chain.from_iterable(of_ladders))
 
     def _write(self, worlds: Worlds, pair: TwinPair, replays: Sequence[Replayed]) -> None:
         first, second = (replayed.world.files for replayed in replays)

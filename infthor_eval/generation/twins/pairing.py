@@ -3,12 +3,16 @@
 A question that the rules ask in one world alone is asked in the other, too, if the independent
 solver answers it there from the whole log. The clues of a pair are those of both worlds together,
 with which the solver must give each world's answer.
+
+A placebo is a question of which a clue frame differs and the answer does not: who says something
+else because frames differ is wrong.
 """
 
 import random
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import islice
 
 from infthor_eval.formats.question import Answer
 from infthor_eval.formats.step_log import Step
@@ -19,6 +23,9 @@ from infthor_eval.generation.questions.checker import Checker
 from infthor_eval.generation.questions.generate import candidates_of, further_candidates_of
 from infthor_eval.generation.questions.history import DEFAULT_SHARE, TrajectoryHistory
 from infthor_eval.household.wording import answer_of, canonical_type
+from infthor_eval.storage.digests import digest
+
+_PLACEBOS = 2  # of a pair of worlds at a moment
 
 # Returns the strict score of a reply for gold answers, from 0 to 1.
 ScoreReply = Callable[[str, Sequence[Answer]], float]
@@ -37,6 +44,10 @@ class AskedWorld:
     steps: Sequence[Step]
     changed: frozenset[str]
     seed: int
+
+    def until(self, moment: int) -> "AskedWorld":
+        """Return the world as it is known after a frame."""
+        return replace(self, steps=self.steps[: moment + 1])
 
     @cached_property
     def history(self) -> TrajectoryHistory:
@@ -95,14 +106,19 @@ class AskedWorld:
 
 
 def pair_questions(
-    worlds: tuple[AskedWorld, AskedWorld], types: frozenset[str], score: ScoreReply
+    worlds: tuple[AskedWorld, AskedWorld],
+    types: frozenset[str],
+    score: ScoreReply,
+    differing: Set[int] = frozenset(),
 ) -> list[PairedQuestion]:
-    """Return the questions on the changed fact that both worlds allow, with both answers.
+    """Return the questions on the changed fact that both worlds allow, with both answers; and
+    placebos.
 
     Args:
         worlds: the two worlds.
         types: object types that the fact is about.
         score: the scorer.
+        differing: frames that differ between the worlds; none for no placebos.
     """
     vocabulary = worlds[0].history.all_object_types | worlds[1].history.all_object_types
     asked = [world.candidates(vocabulary) for world in worlds]
@@ -122,7 +138,27 @@ def pair_questions(
         clues = _shared_clues(worlds, sides)
         if clues is not None:
             paired.append(_paired(sides, clues, type_names, overlap))
-    return paired
+    return paired + list(islice(_placebos(worlds, asked, type_names, differing), _PLACEBOS))
+
+
+def _placebos(
+    worlds: tuple[AskedWorld, AskedWorld],
+    asked: Sequence[Mapping[str, Candidate]],
+    types: set[str],
+    differing: Set[int],
+) -> Iterator[PairedQuestion]:
+    """Yield questions with one answer in both worlds of which a clue frame differs, in an order
+    that says nothing."""
+    for text in sorted(asked[0].keys() & asked[1].keys(), key=digest):
+        sides = asked[0][text], asked[1][text]
+        clues = tuple(sorted({clue for side in sides for clue in _clues_to_share(side)}))
+        if (
+            sides[0].answers == sides[1].answers
+            and not sides[0].absence
+            and not differing.isdisjoint(clues)
+            and all(world.gives(side, clues) for world, side in zip(worlds, sides, strict=True))
+        ):
+            yield _paired(sides, clues, types, (1.0, 1.0))
 
 
 def _both_sides(
@@ -211,6 +247,8 @@ def _paired(
     subjects = {canonical_type(name) for name in (*first.subjects, *second.subjects)}
     topic = first.question_type.removesuffix("_further")
     about = sorted((_types_asked_of(first) & types) or subjects & types)
+    if first.answers == second.answers:
+        topic, about = "placebo", sorted(types)
     return PairedQuestion(
         text=first.text,
         form=first.form,

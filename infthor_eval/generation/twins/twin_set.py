@@ -41,6 +41,7 @@ from infthor_eval.thor.launch import Launch
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.workers import WorkerSettings, run_jobs
 
+_PAIRS_A_PLACEBO = 4
 _MOST = 0.3  # of a set's pairs are of one kind, if there are enough kinds for that
 _QUESTIONS = "qa_set_twins.csv"
 _DRAFTS = "drafts"  # folder in that of the set
@@ -52,15 +53,34 @@ _Draft = TypeVar("_Draft", TwinDraft, FinalTaskDraft)
 
 @dataclass(frozen=True)
 class _ChosenQuestion:
-    """A question of a pair of worlds."""
+    """A question of a pair of worlds, at each of its moments, in order."""
 
     pair: TwinPair
-    question: PairedQuestion
+    rungs: tuple[PairedQuestion, ...]
+
+    @classmethod
+    def of_pair(cls, pair: TwinPair) -> "list[_ChosenQuestion]":
+        """Return the questions of a pair of worlds; those on the same evidence are one."""
+        ladders: dict[tuple[str, int | None], list[PairedQuestion]] = {}
+        for question in pair.questions:
+            ladders.setdefault((question.text, pair.evidence(question.moment)), []).append(question)
+        return [cls(pair, tuple(rungs)) for rungs in ladders.values()]
+
+    @property
+    def question(self) -> PairedQuestion:
+        """The question at its first moment."""
+        return self.rungs[0]
 
     @property
     def fact(self) -> str:
         """Name of the fact, in the whole set."""
         return f"{self.pair.id}/{self.question.fact}"
+
+    @property
+    def ages(self) -> list[int]:
+        """Number of frames since the evidence at each moment; none of a question at the end."""
+        evidence = self.pair.evidence(self.question.moment) or 0
+        return [it.moment - evidence for it in self.rungs if it.moment is not None]
 
 
 class TwinSummary(msgspec.Struct):
@@ -77,6 +97,9 @@ class TwinSummary(msgspec.Struct):
         facts: number of facts that they are about.
         by_kind: paired questions in the set by kind of edit.
         by_form: paired questions in the set by form.
+        by_age: paired questions in the set by the number of frames since their evidence, at
+            moments.
+        placebos: number of placebo pairs in the set, at all moments.
         failures: trajectories that twins cannot be made of, one line each.
         seconds: wall time of this run.
     """
@@ -91,6 +114,8 @@ class TwinSummary(msgspec.Struct):
     facts: int
     by_kind: dict[str, int]
     by_form: dict[str, int]
+    by_age: dict[int, int]
+    placebos: int
     failures: list[str]
     seconds: float
 
@@ -170,21 +195,22 @@ def _require_distinct(drafts: Iterable[TwinDraft]) -> None:
 def _write_set(out: Path, chosen: Sequence[_ChosenQuestion]) -> None:
     """Write pairs and questions; both worlds' questions have the name of their pair."""
     by_pair: dict[str, list[_ChosenQuestion]] = {}
-    for one in sorted(chosen, key=lambda one: (one.pair.id, one.question.text)):
+    for one in sorted(chosen, key=lambda one: (one.pair.id, one.question.text, one.ages)):
         by_pair.setdefault(one.pair.id, []).append(one)
     pairs: list[TwinPair] = []
     questions: list[Question] = []
     for group in by_pair.values():
-        pair = replace(group[0].pair, questions=tuple(one.question for one in group))
-        pairs.append(pair)
+        asked = [(one, rung) for one in group for rung in one.rungs]
+        pairs.append(replace(group[0].pair, questions=tuple(rung for _, rung in asked)))
         for side in (0, 1):
-            questions += [_question(one, number, side) for number, one in enumerate(group, 1)]
+            questions += [
+                _question(one, rung, number, side) for number, (one, rung) in enumerate(asked, 1)
+            ]
     write_pairs(out, pairs)
     write_questions(out / _QUESTIONS, questions)
 
 
-def _question(chosen: _ChosenQuestion, number: int, side: int) -> Question:
-    paired = chosen.question
+def _question(chosen: _ChosenQuestion, paired: PairedQuestion, number: int, side: int) -> Question:
     return Question(
         chosen.pair.traj_ids[side],
         paired.text,
@@ -192,6 +218,7 @@ def _question(chosen: _ChosenQuestion, number: int, side: int) -> Question:
         paired.answers[side],
         paired.question_type,
         paired.absence[side],
+        paired.moment,
         pair=f"{chosen.pair.id}/{number}",
         fact=chosen.fact,
     )
@@ -207,18 +234,27 @@ class _Numbers:
     def summary(self, n_resumed: int, failures: list[str], seconds: float) -> TwinSummary:
         """Return the numbers of the set."""
         proposed, kept, rejected = _count_edits(self.drafts)
-        found = (len(pair.questions) for draft in self.drafts for pair in draft.pairs)
+        found = [
+            question
+            for draft in self.drafts
+            for pair in draft.pairs
+            for question in _ChosenQuestion.of_pair(pair)
+        ]
+        placebos = [len(one.rungs) for one in self.chosen if one.question.is_placebo]
+        paired = [one for one in self.chosen if not one.question.is_placebo]
         return TwinSummary(
             trajectories=len(self.drafts),
             resumed=n_resumed,
             proposed=proposed,
             kept=kept,
             rejected=rejected,
-            found=sum(found),
-            pairs=len(self.chosen),
-            facts=len({one.fact for one in self.chosen}),
-            by_kind=dict(Counter(one.pair.kind for one in self.chosen).most_common()),
-            by_form=dict(Counter(one.question.form for one in self.chosen).most_common()),
+            found=sum(not one.question.is_placebo for one in found),
+            pairs=len(paired),
+            facts=len({one.fact for one in paired}),
+            by_kind=dict(Counter(one.pair.kind for one in paired).most_common()),
+            by_form=dict(Counter(one.question.form for one in paired).most_common()),
+            by_age=dict(sorted(Counter(age for one in paired for age in one.ages).items())),
+            placebos=sum(placebos),
             failures=failures,
             seconds=seconds,
         )
@@ -227,27 +263,38 @@ class _Numbers:
 def choose_pairs(
     trajectories: Sequence[Sequence[TwinPair]], per_trajectory: int
 ) -> list[_ChosenQuestion]:
-    """Choose paired questions, so that kinds, forms and facts are about as frequent as each other.
+    """Choose paired questions, so that kinds, forms and facts are about as frequent as each other,
+    and a placebo for every four of them.
 
     Args:
         trajectories: the pairs of worlds of each trajectory.
-        per_trajectory: most questions of one trajectory.
+        per_trajectory: most questions of one trajectory; at several moments, one counts once.
     """
-    counts: Counter[tuple[str, str]] = Counter()
-    remaining = [
-        [_ChosenQuestion(pair, question) for pair in pairs for question in pair.questions]
+    found = [
+        [question for pair in pairs for question in _ChosenQuestion.of_pair(pair)]
         for pairs in trajectories
     ]
+    paired = [[one for one in candidates if not one.question.is_placebo] for candidates in found]
+    chosen = _without_excess(_in_rounds(paired, per_trajectory))
+    placebos = [[one for one in candidates if one.question.is_placebo] for candidates in found]
+    n_placebos = len(chosen) // _PAIRS_A_PLACEBO
+    return [*chosen, *_in_rounds(placebos, per_trajectory)[:n_placebos]]
+
+
+def _in_rounds(
+    trajectories: Sequence[list[_ChosenQuestion]], per_trajectory: int
+) -> list[_ChosenQuestion]:
+    """Choose from trajectories in turn, so that none takes all of what is seldom."""
+    counts: Counter[tuple[str, str]] = Counter()
     chosen: list[_ChosenQuestion] = []
-    # Round by round, so that no trajectory takes all of what is seldom.
     for _ in range(per_trajectory):
-        for candidates in remaining:
+        for candidates in trajectories:
             if candidates:
                 best = min(candidates, key=lambda candidate: _use(counts, candidate))
                 candidates.remove(best)
                 chosen.append(best)
                 counts.update(_keys(best))
-    return _without_excess(chosen)
+    return chosen
 
 
 def _keys(candidate: _ChosenQuestion) -> list[tuple[str, str]]:
@@ -258,9 +305,11 @@ def _keys(candidate: _ChosenQuestion) -> list[tuple[str, str]]:
     ]
 
 
-def _use(counts: Counter[tuple[str, str]], candidate: _ChosenQuestion) -> tuple[int, int, str]:
+def _use(counts: Counter[tuple[str, str]], candidate: _ChosenQuestion) -> tuple[int, int, int, str]:
+    """Return how much of what a candidate has was chosen; of equals, longer ladders come first."""
     fact, kind, form = (counts[key] for key in _keys(candidate))
-    return fact, kind + form, f"{candidate.pair.id}/{candidate.question.text}"
+    name = f"{candidate.pair.id}/{candidate.question.text}"
+    return fact, kind + form, -len(candidate.rungs), name
 
 
 def _without_excess(chosen: Iterable[_ChosenQuestion]) -> list[_ChosenQuestion]:

@@ -10,9 +10,17 @@ from typing import NamedTuple
 
 import msgspec
 
-from infthor_eval.distances import DISTANCES, LENGTHS, distance_class, length_class
+from infthor_eval.distances import (
+    AGES,
+    DISTANCES,
+    LENGTHS,
+    age_class,
+    distance_class,
+    length_class,
+)
 from infthor_eval.facets import Facet
 from infthor_eval.nieh.records import NiehAnswer, TwinSide
+from infthor_eval.nieh.results.retention import Ladder, Retention, retention_of
 from infthor_eval.nieh.scoring import SCORERS, compared_form, scores
 from infthor_eval.pairs import Pairs, PairScore, PairShares, net_pairs
 from infthor_eval.rates import Rate
@@ -22,7 +30,7 @@ from infthor_eval.runs import UnitRecord
 _SIZES = (1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1024)
 N_SHOWN = (*(f"<={size}" for size in _SIZES), f">{_SIZES[-1]}")
 SHOWN_DIFFERENCE = ("yes", "no")
-NEVER_CHANGED = "never"
+N_CLUES = ("1", "2", ">=3")
 
 Record = UnitRecord[NiehAnswer]
 
@@ -47,6 +55,10 @@ class PairSummary(msgspec.Struct, frozen=True):
         one_right: exactly one of both is right.
         one_is_commoner: of these pairs, the right one has the commoner gold answer of its form
             (a half where both are as common): prior knowledge, not memory; None if there are none.
+        placebo: of the placebo pairs, whose frames differ and whose answers do not: both right;
+            None without any. They are in no other rate.
+        retention: what is left of net pairs as the evidence grows older; None unless questions
+            were asked at several moments.
         by: net pairs by facet and class (`PAIR_FACETS`): `by_FACET` in results.json.
         scores: net score of each pair, by the trajectory that its worlds were made of.
     """
@@ -64,6 +76,8 @@ class PairSummary(msgspec.Struct, frozen=True):
     right_when_flipped: Rate | None
     one_right: Rate
     one_is_commoner: Rate | None
+    placebo: Rate | None
+    retention: Retention | None
     by: dict[str, dict[str, Rate]]
     scores: dict[str, dict[str, float]]
 
@@ -107,8 +121,9 @@ def is_flipped(one: Side, other: Side) -> bool:
 
 
 def score_pairs(records: Iterable[Record], metric: str) -> list[PairScore]:
-    """Return the scores of the pairs of a task under a metric."""
-    return _pairs(find_pairs(records)[0], metric).scores()
+    """Return the scores of the pairs of a task under a metric, without placebos."""
+    pairs = [pair for pair in find_pairs(records)[0] if not _is_placebo(pair)]
+    return _pairs(pairs, metric).scores()
 
 
 def summarise_pairs(
@@ -121,9 +136,11 @@ def summarise_pairs(
     Args:
         n_missing: number of questions that a stopped run did not come to.
     """
-    found, n_incomplete = find_pairs(records)
+    answered, n_incomplete = find_pairs(records)
+    found = [pair for pair in answered if not _is_placebo(pair)]
     if not found:
         return None
+    placebos = [pair for pair in answered if _is_placebo(pair)]
     pairs = _pairs(found, metric)
     scores = pairs.scores()
     flipped = [pair for pair in found if is_flipped(*pair)]
@@ -140,9 +157,32 @@ def summarise_pairs(
         right_when_flipped=pairs.mean(pairs.are_right, flipped) if flipped else None,
         one_right=pairs.mean(pairs.is_one_right),
         one_is_commoner=_commoner(pairs, one_right) if one_right else None,
+        placebo=pairs.mean(pairs.are_right, placebos) if placebos else None,
+        retention=retention_of(_ladders(pairs)),
         by={facet.name: facet.means(found, pairs.net) for facet in PAIR_FACETS},
         scores=_by_trajectory(scores),
     )
+
+
+def _is_placebo(pair: TwinRecords) -> bool:
+    """Return True if the answer is the same in both worlds."""
+    record, twin = pair[0]
+    return record.payload.answers == twin.answers
+
+
+def _ladders(pairs: Pairs[Side]) -> list[Ladder]:
+    """Return the questions that were asked at moments, each with its net score by age."""
+    scores: dict[tuple[object, ...], dict[int, list[PairShares]]] = {}
+    for pair in pairs.pairs:
+        record, twin = pair[0]
+        if twin.age is not None and twin.length is not None:
+            evidence = twin.length - twin.age
+            name = (record.cluster, twin.fact, record.payload.question, record.variant, evidence)
+            scores.setdefault(name, {}).setdefault(twin.age, []).append(pairs.shares(pair))
+    return [
+        Ladder(str(name[0]), {age: PairShares.mean(same).net for age, same in by_age.items()})
+        for name, by_age in scores.items()
+    ]
 
 
 def _pairs(pairs: Sequence[TwinRecords], metric: str) -> Pairs[Side]:
@@ -248,10 +288,24 @@ def _difference(pair: TwinRecords) -> str | None:
     return None if None in counts else SHOWN_DIFFERENCE[not all(counts)]
 
 
-def _age(pair: TwinRecords) -> str:
-    ages = [side.twin.n_since_change for side in pair]
-    known = [age for age in ages if age is not None]
-    return distance_class(min(known)) if known else NEVER_CHANGED
+def _clues(pair: TwinRecords) -> str:
+    n_clues = max(side.record.payload.n_clues for side in pair)
+    return N_CLUES[min(max(n_clues, 1), len(N_CLUES)) - 1]
+
+
+def _age(pair: TwinRecords) -> str | None:
+    age = pair[0].twin.age
+    return None if age is None else age_class(age)
+
+
+def _span(pair: TwinRecords) -> str | None:
+    span = pair[0].twin.span
+    return None if span is None else age_class(span)
+
+
+def _length(pair: TwinRecords) -> str | None:
+    length = pair[0].twin.length
+    return None if length is None else age_class(length)
 
 
 # Those by which a chart has curves of memory, in the tables' order.
@@ -264,9 +318,9 @@ _DISTANCE = Facet(
 _SHOWN = Facet("shown", "number of frames shown", _shown, N_SHOWN)
 _AGE = Facet(
     "age",
-    "frames since the agent last changed what is asked about",
+    "frames since the newest evidence",
     _age,
-    (*DISTANCES, NEVER_CHANGED),
+    AGES,
 )
 MEMORY_FACETS = (_DISTANCE, _SHOWN, _AGE)
 PAIR_FACETS: tuple[Facet[TwinRecords], ...] = (
@@ -287,4 +341,7 @@ PAIR_FACETS: tuple[Facet[TwinRecords], ...] = (
         SHOWN_DIFFERENCE,
     ),
     _AGE,
+    Facet("span", "frames since the oldest clue", _span, AGES),
+    Facet("length", "frames up to the question", _length, AGES),
+    Facet("clues", "number of clue frames", _clues, N_CLUES),
 )

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from infthor_eval.nieh.records import ShownClues, TwinSide
-from infthor_eval.nieh.results.pair_summary import NEVER_CHANGED, score_pairs, summarise_pairs
+from infthor_eval.nieh.results.pair_summary import score_pairs, summarise_pairs
 from infthor_eval.pairs import PAIR_BOUNDS, PairShares
 from infthor_eval.rates import format_percent
 
@@ -28,6 +28,7 @@ def side(
     n_frames=3,
     n_differing=1,
     age=None,
+    length=100,
     n_after=None,
 ):
     twin = TwinSide(
@@ -39,7 +40,9 @@ def side(
         n_frames=n_frames,
         n_differing=n_differing,
         n_after_clues=n_frames - 1,
-        n_since_change=age,
+        age=age,
+        span=age,
+        length=length,
     )
     shown = None if n_after is None else ShownClues(n_shown=1, n_clues=1, n_after=n_after)
     named = {"task": "nieh_twins", "id": f"{base}-{world}/{pair}", "cluster": base}
@@ -191,7 +194,44 @@ def test_groups_of_pairs_have_their_names_in_order():
     assert list(found.by["shown"]) == ["<=1", "<=64"]
     assert list(found.by["distance"]) == ["0-49", "100-199"]
     assert list(found.by["difference"]) == ["yes", "no"]
-    assert list(found.by["age"]) == ["50-99", NEVER_CHANGED]
+    assert list(found.by["age"]) == list(found.by["span"]) == ["30-99"]
+    assert {name: rate.n for name, rate in found.by["length"].items()} == {"100-299": 2}
+    assert {name: rate.n for name, rate in found.by["clues"].items()} == {"1": 2}
+
+
+def test_placebos_are_in_no_rate_but_their_own():
+    placebos = [
+        *pair("bowl", "bowl", "p/1", base="u"),
+        *pair("bowl", "sofa", "p/2", base="u"),
+    ]
+    same = [
+        replace(
+            it,
+            payload=replace(
+                it.payload,
+                answers=("bowl",),
+                twin=replace(it.payload.twin, answers=("bowl",)),
+                scores={"strict": float(it.payload.reply == "bowl")},
+            ),
+        )
+        for it in placebos
+    ]
+    found = summary([*pair("bowl", "sofa"), *same])
+    assert (found.n_pairs, found.net_pairs.mean, found.placebo.mean) == (1, 1.0, 0.5)
+    assert [it.pair for it in score_pairs([*pair("bowl", "sofa"), *same], "strict")] == ["a/1"]
+    assert summary(pair("bowl", "sofa")).placebo is None
+
+
+def test_questions_on_one_evidence_are_followed_from_age_to_age():
+    found = summary(
+        [
+            record
+            for base in ("t", "u")
+            for age, second in ((10, "sofa"), (30, "sofa" if base == "t" else "bowl"))
+            for record in pair("bowl", second, f"{base}/{age}", base=base, age=age, length=50 + age)
+        ]
+    )
+    assert found.retention is None  # they are about two facts each
 
 
 def test_questions_without_twins_have_no_summary_of_pairs():

@@ -42,7 +42,7 @@ def test_a_chart_per_curve_with_several_classes_opens_the_page(runs):
         "nieh_gt: net pairs of twins, by frames between the last clue and the end of the "
         "trajectory",
         "nieh_gt: net pairs of twins, by number of frames shown",
-    ]  # what is asked about never changed, in all of them
+    ]  # how old their evidence is, these records do not say
     assert section.charts[0].description == (
         "remembers 100.0 % at 0-49, 0.0 % at 50-99; guesses 0.0 % at 0-49, 0.0 % at 50-99"
     )
@@ -67,7 +67,7 @@ def test_the_figure_has_a_panel_per_curve_and_a_row_per_class(runs, tmp_path):
     by_distance = "frames between the last clue and the end of the trajectory"
     assert rows["remembers", by_distance, "0-49"] == ("100.0 [all equal]", "2")
     assert rows["guesses", "number of frames shown", "<=8"] == ("0.0 [all equal]", "2")
-    assert len(rows) == 2 * (2 + 2 + 1)
+    assert len(rows) == 2 * (2 + 2)
     paths = save_figure(result.plot, tmp_path, "pairs")
     assert [path.name for path in paths] == ["pairs.png", "pairs.svg"]
     svg = paths[1].read_text()

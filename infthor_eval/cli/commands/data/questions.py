@@ -11,6 +11,7 @@ import click
 from infthor_eval.cli.help import ExampleCommand
 from infthor_eval.cli.options.values import PATH, FiniteFloat, WholeNumber, floor_plans_option
 from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
+from infthor_eval.errors import UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -132,6 +133,12 @@ def questions(
     help="Twins of one kind and trajectory, at most; twice as many edits are tried.",
 )
 @click.option(
+    "--rungs",
+    metavar="FRAMES,...",
+    help="Ask so many frames after the evidence, while both worlds look the same: 10,30,100,300; "
+    "with placebo pairs. Default: at the end.",
+)
+@click.option(
     "--seed", type=WholeNumber(0), default=0, show_default=True, help="Seed of every choice."
 )
 @click.option("--limit", type=click.IntRange(1), help="Trajectories, at most.")
@@ -154,6 +161,7 @@ def twins(
     kinds: str | None,
     per_trajectory: int,
     per_kind: int,
+    rungs: str | None,
     seed: int,
     limit: int | None,
     unity: bool,
@@ -182,7 +190,9 @@ def twins(
     from infthor_eval.thor.supplement import supplement_file
 
     worker_settings = parse_worker_settings(**workers)
-    settings = TwinSettings(parse_kinds(kinds, final_tasks), seed, per_kind)
+    if rungs and final_tasks:
+        raise UsageError("--rungs is for questions; leave it out, or --final-tasks")
+    settings = TwinSettings(parse_kinds(kinds, final_tasks), seed, per_kind, _parse_rungs(rungs))
     notes = error_console()
     with ExitStack() as held:
         held.enter_context(hold_folder(out))
@@ -229,12 +239,26 @@ def parse_kinds(names: str | None, final_tasks: bool = False) -> tuple[str, ...]
     return wanted
 
 
+def _parse_rungs(text: str | None) -> tuple[int, ...]:
+    """Return numbers of frames in order, each once; an entry that is none is an error."""
+    entries = [entry.strip() for entry in text.split(",")] if text else []
+    if not all(entry.isascii() and entry.isdigit() and int(entry) for entry in entries):
+        raise UsageError(f"--rungs {text}: give numbers of frames above 0, as in 10,30,100")
+    return tuple(sorted(set(map(int, entries))))
+
+
 def _print(summary: TwinSummary | FinalTaskSummary, output: Console) -> None:
     from infthor_eval.generation.twins.twin_set import TwinSummary
 
     if isinstance(summary, TwinSummary):
         found = f"{summary.pairs} paired questions of {summary.found} on {summary.facts} facts"
-        tables = [("by kind", summary.by_kind), ("by form", summary.by_form)]
+        if summary.by_age:
+            found += f", {summary.placebos} placebos"
+        tables = [
+            ("by kind", summary.by_kind),
+            ("by form", summary.by_form),
+            ("by frames since the evidence", summary.by_age),
+        ]
     else:
         found = f"{summary.pairs} pairs of final tasks"
         tables = [("by kind", summary.kept)]
@@ -244,4 +268,6 @@ def _print(summary: TwinSummary | FinalTaskSummary, output: Console) -> None:
         f"{found}, {summary.seconds} s"
     )
     for title, counts in (*tables, ("rejected", summary.rejected)):
+        if not counts:
+            continue
         output.print(f"{title}: {', '.join(f'{name} {count}' for name, count in counts.items())}")
