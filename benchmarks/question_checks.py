@@ -1,16 +1,18 @@
 """Check the questions on a set: the independent checker on all candidates, and baselines that do
 not see frames.
 
-python benchmarks/question_checks.py SET [--per-trajectory 25] [--seed 0] [--further]
+python benchmarks/question_checks.py SET [--per-trajectory 25] [--seed 0] [--further] [--moments N]
 
 The checker answers every candidate of the rules in another way: from the whole log, from the
 entries of the clue frames, and with each clue left out. The baselines answer the questions that are
-chosen from the candidates.
+chosen from the candidates. With --moments both are of logs that end at so many moments, drawn, of
+each trajectory.
 """
 
 import argparse
 import random
 from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 from statistics import fmean
 
@@ -22,7 +24,7 @@ from infthor_eval.generation.questions.generate import (
     generate_questions,
 )
 from infthor_eval.generation.questions.history import DEFAULT_SHARE, TrajectoryHistory
-from infthor_eval.nieh.contexts import Sample
+from infthor_eval.nieh.contexts import QuestionVariant
 from infthor_eval.nieh.docs import doc_target
 from infthor_eval.nieh.guessing.blind import visible_knowledge
 from infthor_eval.nieh.guessing.guessers import blind_guesser
@@ -38,19 +40,21 @@ def main() -> None:
     parser.add_argument("--per-trajectory", type=int, default=25)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--further", action="store_true", help="choose among the further forms too")
+    parser.add_argument("--moments", type=int, default=0, help="moments of each trajectory")
     options = parser.parse_args()
-    check_all(options.set)
+    check_all(options.set, options.moments)
     generated = generate_questions(
         options.set,
         seed=options.seed,
         per_trajectory=options.per_trajectory,
         further=options.further,
+        moments=options.moments,
     )
     print(
         f"chosen: {len(generated.questions)}, by number of clues {generated.by_clues()}, by type "
         f"{generated.by_type()}"
     )
-    samples = [Sample(question, question.clues) for question in generated.questions]
+    samples = [QuestionVariant(question, question.clues) for question in generated.questions]
     keys = [doc_target(question) for question in generated.questions]
     guesses = blind_guesser(visible_knowledge("clues")).guess(samples)
     for name, replies in (("oracle", keys), ("blind", guesses)):
@@ -65,12 +69,19 @@ def main() -> None:
         )
 
 
-def check_all(folder: Path) -> None:
+def histories_of(folder: Path, n_moments: int) -> Iterator[TrajectoryHistory]:
+    """Yield what has happened in each trajectory, up to its end or to so many moments."""
+    for path in sorted((folder / "metadata").iterdir()):
+        steps = read_steps(path)
+        draw = random.Random(path.name)
+        moments = draw.sample(range(len(steps)), min(n_moments, len(steps)))
+        for moment in sorted(moments) or [len(steps) - 1]:
+            yield TrajectoryHistory(path.name, steps[: moment + 1])
+
+
+def check_all(folder: Path, n_moments: int) -> None:
     """Print how many candidates the checker confirms, and those that it does not."""
-    histories = [
-        TrajectoryHistory(path.name, read_steps(path))
-        for path in sorted((folder / "metadata").iterdir())
-    ]
+    histories = list(histories_of(folder, n_moments))
     vocabulary = frozenset[str]().union(*(history.all_object_types for history in histories))
     counts: Counter[str] = Counter()
     for history in histories:
@@ -98,7 +109,7 @@ def check_all(folder: Path) -> None:
                     f"{verdict}"
                 )
     shares = ", ".join(f"{name} {counts[name]}" for name in ("right", "sufficient", "minimal"))
-    print(f"{len(histories)} trajectories, {counts['all']} candidates: {shares}")
+    print(f"{len(histories)} logs, {counts['all']} candidates: {shares}")
 
 
 if __name__ == "__main__":

@@ -8,9 +8,9 @@ import random
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from infthor_eval.errors import DataError, InfthorError, UsageError, wrap_errors
 from infthor_eval.formats.question import ABSENCE, Question
@@ -82,6 +82,7 @@ def generate_questions(
     further: bool = False,
     published_words: bool = False,
     by_subject: bool = True,
+    moments: int = 0,
     worker_settings: WorkerSettings = _ONE_PROCESS,
     notify: Callable[[str], None] = lambda _: None,
     begin: Callable[[str, int], Callable[[], object]] = lambda *_: lambda: None,
@@ -91,12 +92,14 @@ def generate_questions(
     Args:
         folder: the set, with `metadata/<traj_id>/metadata.json`.
         seed: seed of all random choices.
-        per_trajectory: maximum number of questions on one trajectory.
+        per_trajectory: maximum number of questions on one trajectory, at each of its moments.
         share: share of the frame's pixels that an object must fill to count as shown.
         further: True to add our further forms, which have no published words.
         published_words: True for the same questions in the words of the published files.
         by_subject: True to balance the answers on each object in each kind of room, too; False
             leaves more questions, for training.
+        moments: number of moments of each trajectory, evenly spaced up to its last frame, after
+            which questions are asked; 0 to ask at the end alone.
         worker_settings: number and place of the workers; they do not change the questions.
         notify: called with messages about the workers.
         begin: called with the name of a part of the work and its number of trajectories; returns
@@ -116,39 +119,50 @@ def generate_questions(
     vocabularies: dict[str, frozenset[str]] = {}
     for path, kind in rooms.items():
         vocabularies[kind] = vocabularies.get(kind, frozenset()) | types[path]
-    rule_jobs = [_RuleJob(path, vocabularies[rooms[path]], seed, share, further) for path in types]
+    rule_jobs = [
+        _RuleJob(Asked(path, moment), vocabularies[rooms[path]], seed, share, further)
+        for path in types
+        for moment in (_moments(path, share, moments) if moments else (None,))
+    ]
     advance = begin("questions found", len(rule_jobs))
-    candidates_by_path = _share_out(rule_jobs, worker_settings, notify, advance, result)
+    found = _share_out(rule_jobs, worker_settings, notify, advance, result)
     chooser = Chooser(by_subject=by_subject)
     check_jobs = []
-    chosen_by_path = {}
+    chosen: dict[Asked, list[Candidate]] = {}
     # Not shared out: the balance depends on what was chosen on all trajectories before.
-    for path in [path for path in types if path in candidates_by_path]:
-        candidates, rng = candidates_by_path[path]
-        chosen = chosen_by_path[path] = chooser.choose(candidates, per_trajectory, rng, rooms[path])
-        questions = tuple(candidate.question(path.name) for candidate in chosen)
-        check_jobs.append(_CheckJob(path, questions, share))
+    for asked, (candidates, rng) in found.items():
+        chosen[asked] = chooser.choose(candidates, per_trajectory, rng, rooms[asked.path])
+        questions = tuple(candidate.question(asked.path.name) for candidate in chosen[asked])
+        check_jobs.append(_CheckJob(asked, questions, share))
     advance = begin("questions checked", len(check_jobs))
     soundness = _share_out(check_jobs, worker_settings, notify, advance, result)
     for job in check_jobs:
         # Checked in our words, which the checker reads.
-        checked = zip(chosen_by_path[job.path], soundness.get(job.path, ()), strict=False)
-        _sort_out(result, job.path.name, checked, published_words=published_words)
+        checked = zip(chosen[job.asked], soundness.get(job.asked, ()), strict=False)
+        _sort_out(result, job.asked, checked, published_words=published_words)
     return result
+
+
+def _moments(path: Path, share: float, n: int) -> list[int]:
+    """Return the last frames of so many equal parts of a trajectory."""
+    n_frames = len(_read_history(path, share))
+    return sorted({max(0, n_frames * part // n - 1) for part in range(1, n + 1)})
 
 
 def _sort_out(
     result: GeneratedQuestions,
-    traj_id: str,
+    asked: "Asked",
     checked: Iterable[tuple[Candidate, bool]],
     *,
     published_words: bool,
 ) -> None:
     """Add candidates on a trajectory to a result, by whether their answers were confirmed."""
+    traj_id = asked.path.name
     for candidate, is_sound in checked:
         question = candidate.question(traj_id)
         if published_words:
             question = in_published_words(candidate, traj_id)
+        question = replace(question, moment=asked.moment)
         (result.questions if is_sound else result.unconfirmed).append(question)
 
 
@@ -172,11 +186,22 @@ def _object_types(
     return types
 
 
+class Asked(NamedTuple):
+    """A trajectory's folder, and the frame after which it is asked about; None for the end."""
+
+    path: Path
+    moment: int | None = None
+
+    def history(self, share: float) -> TrajectoryHistory:
+        """Return what has happened by then."""
+        return _read_history(self.path, share, self.moment)
+
+
 @dataclass(frozen=True)
 class _RuleJob:
     """Applies all rules to a trajectory."""
 
-    path: Path
+    asked: Asked
     vocabulary: frozenset[str]
     seed: int
     share: float
@@ -184,9 +209,10 @@ class _RuleJob:
 
     def run(self) -> tuple[list[Candidate], random.Random]:
         """Return the candidates, and the random stream for the later choices on this trajectory."""
-        history = _read_history(self.path, self.share)
+        history = self.asked.history(self.share)
         # A stream per trajectory, so that its questions do not depend on the order of the jobs.
-        rng = random.Random(f"{self.seed}/{history.traj_id}")
+        moment = "" if self.asked.moment is None else f"/{self.asked.moment}"
+        rng = random.Random(f"{self.seed}/{history.traj_id}{moment}")
         candidates = candidates_of(history, self.vocabulary, rng)
         if self.further:
             candidates += further_candidates_of(history, rng)
@@ -197,13 +223,13 @@ class _RuleJob:
 class _CheckJob:
     """Checks the chosen questions on a trajectory."""
 
-    path: Path
+    asked: Asked
     questions: tuple[Question, ...]
     share: float
 
     def run(self) -> list[bool]:
         """Return True for each sound question."""
-        checker = Checker(_read_history(self.path, self.share).steps, self.share)
+        checker = Checker(self.asked.history(self.share).steps, self.share)
         return [checker.verdict(question).sound for question in self.questions]
 
 
@@ -217,7 +243,7 @@ class _QuestionWorker:
 
     def do(self, job: _RuleJob | _CheckJob) -> Iterator[Any]:
         try:
-            with _naming_inconsistency(job.path):
+            with _naming_inconsistency(job.asked.path):
                 result: Any = job.run()
         except DataError as error:  # of this trajectory alone
             yield error
@@ -234,22 +260,23 @@ def _share_out(
     notify: Callable[[str], None],
     advance: Callable[[], object],
     result: GeneratedQuestions,
-) -> dict[Path, Any]:
-    """Return the results by trajectory; one at which several workers were lost is skipped."""
-    results: dict[Path, Any] = {}
+) -> dict[Asked, Any]:
+    """Return the results by what they are of; one at which several workers were lost is skipped."""
+    results: dict[int, Any] = {}
     for number, outcome in run_jobs(_QuestionWorker, jobs, worker_settings, notify):
         advance()
         if isinstance(outcome, InfthorError):
-            place = "" if isinstance(outcome, DataError) else f"{jobs[number].path}: "
+            place = "" if isinstance(outcome, DataError) else f"{jobs[number].asked.path}: "
             result.skipped.append(f"{place}{outcome}")
         else:
-            results[jobs[number].path] = outcome
-    return results
+            results[number] = outcome
+    return {jobs[number].asked: results[number] for number in sorted(results)}
 
 
-def _read_history(path: Path, share: float) -> TrajectoryHistory:
+def _read_history(path: Path, share: float, moment: int | None = None) -> TrajectoryHistory:
     with _naming_inconsistency(path):
-        return TrajectoryHistory(path.name, read_steps(path), share)
+        steps = read_steps(path)
+        return TrajectoryHistory(path.name, steps if moment is None else steps[: moment + 1], share)
 
 
 def _naming_inconsistency(path: Path) -> AbstractContextManager[None]:

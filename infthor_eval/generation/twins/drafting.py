@@ -32,7 +32,7 @@ from infthor_eval.generation.twins.pairing import (
 )
 from infthor_eval.generation.twins.pictures import are_clearly_unlike
 from infthor_eval.generation.twins.rewriting import without_traces
-from infthor_eval.generation.twins.rungs import ladders, that_stay
+from infthor_eval.generation.twins.rungs import ladders, stretches, that_stay
 from infthor_eval.generation.twins.tolerance import tolerance_of
 from infthor_eval.household.wording import canonical_type
 from infthor_eval.storage.digests import digest, digest_of_file
@@ -103,9 +103,11 @@ def draft_twins(
     draft = TwinDraft(base, settings, trajectory.scene.floor_plan)
     episode = read_episode(trajectory, simulator)
     with ExitStack() as stack:
-        maker = _Maker(draft, episode, score, Replays(simulator, stack), out)
-        for name in settings.kinds:
-            maker.try_kind(name)
+        replays = Replays(simulator, stack)
+        for stretch in stretches(episode) if settings.rungs else (episode,):
+            maker = _Maker(draft, stretch, score, replays, out)
+            for name in settings.kinds:
+                maker.try_kind(name)
     return draft
 
 
@@ -169,8 +171,10 @@ class _Maker:
         settings = self._draft.settings
         kind: EditKind = KINDS.load(name, EditKind)()
         stream = f"{settings.seed}/{self._draft.digest}/{name}"
+        if not self._episode.is_whole:
+            stream += f"/{len(self._episode.history)}"
         rng = random.Random(stream)
-        rejected: dict[str, int] = {}
+        rejected = self._draft.rejected.setdefault(name, {})
         pairs: list[TwinPair] = []
         n_proposed = 0
         for proposal in kind.propose(self._episode, rng):
@@ -185,9 +189,9 @@ class _Maker:
             else:
                 pairs += [pair] if pair.tells_worlds else []
         if n_proposed:
-            self._draft.proposed[name] = n_proposed
-        if rejected:
-            self._draft.rejected[name] = rejected
+            self._draft.proposed[name] = self._draft.proposed.get(name, 0) + n_proposed
+        if not rejected:
+            del self._draft.rejected[name]
         self._draft.pairs += pairs
 
     def _try(self, proposal: Proposal, kind: str, pair_id: str) -> TwinPair:

@@ -11,7 +11,7 @@ from infthor_eval.formats.trajectory import ApiAction, Trajectory
 from infthor_eval.generation.questions import open_state
 from infthor_eval.generation.questions.history import ObjectMove, TrajectoryHistory
 from infthor_eval.generation.replay import replay
-from infthor_eval.generation.twins.rewriting import whole_of
+from infthor_eval.generation.twins.rewriting import first_subgoals, whole_of
 from infthor_eval.household.containment import logged_parent
 from infthor_eval.household.wording import canonical_type
 from infthor_eval.storage.scratch import ScratchFolder
@@ -33,11 +33,20 @@ class Episode:
         trajectory: the trajectory; the ids in its actions are the simulator's.
         start: the restored scene, before the agent's first action.
         history: what happened, from the log.
+        is_whole: False for a stretch of one.
     """
 
     trajectory: Trajectory
     start: SimulatorView
     history: TrajectoryHistory
+    is_whole: bool = True
+
+    def until(self, n_high: int) -> "Episode":
+        """Return the episode up to the end of so many sub-goals."""
+        trajectory = first_subgoals(self.trajectory, n_high)
+        steps = self.history.steps[: len(trajectory.plan.low_actions) + 1]
+        history = TrajectoryHistory(trajectory.traj_id, steps)
+        return Episode(trajectory, self.start, history, is_whole=False)
 
     @cached_property
     def loose(self) -> tuple[ThorObject, ...]:

@@ -17,7 +17,7 @@ import msgspec
 from msgspec.structs import replace
 
 from infthor_eval.errors import DataError
-from infthor_eval.formats.trajectory import SubTask, SubTrajectory, Trajectory, encode_trajectory
+from infthor_eval.formats.trajectory import SubTrajectory, Trajectory, encode_trajectory
 from infthor_eval.formats.twins import TwinPlace, TwinWorld
 from infthor_eval.generation.questions.history import TrajectoryHistory
 from infthor_eval.generation.replay import ActionReplay, ReplayReport
@@ -34,7 +34,7 @@ from infthor_eval.generation.twins.episode import Episode, read_episode
 from infthor_eval.generation.twins.exchanges import Exchange
 from infthor_eval.generation.twins.final_places import Errand, are_apart, errands, place_in
 from infthor_eval.generation.twins.kinds import KINDS, EditKind, EditRefused, Proposal, Worlds
-from infthor_eval.generation.twins.rewriting import without_traces
+from infthor_eval.generation.twins.rewriting import first_subgoals, without_traces
 from infthor_eval.generation.walking import Walker
 from infthor_eval.household.first_place import FirstPlace, first_place, is_looked_at
 from infthor_eval.household.goals import goal_holds
@@ -184,7 +184,7 @@ class _Maker:
         reasons: list[str] = []
         n_tried = 0
         for n_high in range(len(worlds.pair[0].plan.high_pddl), 0, -1):
-            pair = [_begin(world, n_high) for world in worlds.pair]
+            pair = [first_subgoals(world, n_high) for world in worlds.pair]
             last = len(pair[0].plan.low_actions)
             if last < _LEAST_STEPS or n_tried >= _TRIALS:
                 break
@@ -216,29 +216,6 @@ class _Maker:
         except Difference as error:
             reasons.append(str(error))
             return []
-
-
-def _begin(world: Trajectory, n_high: int) -> Trajectory:
-    """Return the first sub-goals of a world: their actions, and the tasks that they are of."""
-    high_pddl = world.plan.high_pddl[:n_high]
-    known = {high.high_idx for high in high_pddl}
-    low_actions = [low for low in world.plan.low_actions if low.high_idx in known]
-    parts = [
-        msgspec.structs.replace(
-            part,
-            high_pddl_idx=(part.high_pddl_idx[0], min(part.high_pddl_idx[1], n_high)),
-            low_pddl_idx=(part.low_pddl_idx[0], min(part.low_pddl_idx[1], len(low_actions))),
-        )
-        for part in world.sub_trajs
-        if part.high_pddl_idx[0] < n_high
-    ]
-    return msgspec.structs.replace(
-        world,
-        plan=msgspec.structs.replace(world.plan, low_actions=low_actions, high_pddl=high_pddl),
-        sub_tasks=_tasks(world)[: len(parts)],
-        sub_trajs=parts,
-        long_horizon_task=None,
-    )
 
 
 class _FinalRun:
@@ -336,13 +313,6 @@ def _with_actions(
         )
     ]
     return msgspec.structs.replace(without_traces(whole, name), object_log=logs, twin=twin)
-
-
-def _tasks(world: Trajectory) -> list[SubTask]:
-    """Return the tasks of a world's parts; some files have an earlier final one apart."""
-    final = world.long_horizon_task
-    apart = final is not None and len(world.sub_trajs) == len(world.sub_tasks) + 1
-    return [*world.sub_tasks, final] if apart and final is not None else list(world.sub_tasks)
 
 
 class _Prospects:

@@ -90,6 +90,36 @@ def with_inserted(trajectory: Trajectory, index: int, actions: Sequence[ApiActio
     )
 
 
+def first_subgoals(world: Trajectory, n_high: int) -> Trajectory:
+    """Return the first sub-goals of a world: their actions, and the tasks that they are of."""
+    high_pddl = world.plan.high_pddl[:n_high]
+    known = {high.high_idx for high in high_pddl}
+    low_actions = [low for low in world.plan.low_actions if low.high_idx in known]
+    parts = [
+        msgspec.structs.replace(
+            part,
+            high_pddl_idx=(part.high_pddl_idx[0], min(part.high_pddl_idx[1], n_high)),
+            low_pddl_idx=(part.low_pddl_idx[0], min(part.low_pddl_idx[1], len(low_actions))),
+        )
+        for part in world.sub_trajs
+        if part.high_pddl_idx[0] < n_high
+    ]
+    return msgspec.structs.replace(
+        world,
+        plan=msgspec.structs.replace(world.plan, low_actions=low_actions, high_pddl=high_pddl),
+        sub_tasks=tasks_of(world)[: len(parts)],
+        sub_trajs=parts,
+        long_horizon_task=None,
+    )
+
+
+def tasks_of(world: Trajectory) -> list[SubTask]:
+    """Return the tasks of a world's parts; some files have an earlier final one apart."""
+    final = world.long_horizon_task
+    apart = final is not None and len(world.sub_trajs) == len(world.sub_tasks) + 1
+    return [*world.sub_tasks, final] if apart and final is not None else list(world.sub_tasks)
+
+
 def exchange_ids(ids: Mapping[str, str]) -> Callable[[str], str]:
     """Return a function from ids to new ones; a slice or a part goes with its whole."""
 

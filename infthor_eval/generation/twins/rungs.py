@@ -8,8 +8,25 @@ from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
 from infthor_eval.formats.twins import ComparedFrame, PairedQuestion
+from infthor_eval.generation.twins.episode import Episode
 
 _MOST = 3  # ladders of a pair of worlds: those that reach farthest
+_SHORTEST = 100  # actions of a stretch
+
+
+def stretches(episode: Episode) -> Iterator[Episode]:
+    """Yield the episode, its first half, the half of that and so on, each to the end of a sub-goal.
+
+    What is touched later is free in a stretch that ends before.
+    """
+    ends = {low.high_idx: at for at, low in enumerate(episode.trajectory.plan.low_actions, 1)}
+    yield episode
+    wanted = len(episode.trajectory.plan.low_actions) / 2
+    while wanted >= _SHORTEST:
+        ended = [high_idx for high_idx, end in ends.items() if end <= wanted]
+        if ended:
+            yield episode.until(max(ended) + 1)
+        wanted /= 2
 
 
 def ladders(frames: Sequence[ComparedFrame], rungs: Sequence[int]) -> list[list[int]]:

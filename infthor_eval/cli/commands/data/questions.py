@@ -34,7 +34,12 @@ if TYPE_CHECKING:
     type=click.IntRange(1),
     default=25,
     show_default=True,
-    help="Questions per trajectory, at most.",
+    help="Questions per trajectory and moment, at most.",
+)
+@click.option(
+    "--moments",
+    type=click.IntRange(1),
+    help="Ask at so many moments of each trajectory, evenly spaced. Default: at its end.",
 )
 @click.option(
     "--min-share",
@@ -65,6 +70,7 @@ def questions(
     out: Path,
     seed: int,
     per_trajectory: int,
+    moments: int | None,
     min_share: float,
     further: bool,
     words: str,
@@ -90,6 +96,7 @@ def questions(
             folder,
             seed=seed,
             per_trajectory=per_trajectory,
+            moments=moments or 0,
             share=min_share,
             further=further,
             published_words=words == "published",
