@@ -112,3 +112,28 @@ def test_both_answers_must_follow_from_the_clues(shown):
         for step in second.steps:
             step.seen = {}
     assert ("Where did you move the mug to?" in paired(put(MUG, DESK), second, "Mug")) == shown
+
+
+def test_a_placebo_differs_in_a_clue_frame_and_not_in_its_answer():
+    first, second = put(MUG, DESK), put(MUG, FRIDGE)
+    worlds = tuple(AskedWorld(log.steps, frozenset({MUG}), 0) for log in (first, second))
+    types = frozenset({"Mug", "Desk", "Fridge"})
+    by_frames = {
+        frame: [pair for pair in pair_questions(worlds, types, STRICT, {frame}) if pair.is_placebo]
+        for frame in (0, 1)
+    }
+    for frame, placebos in by_frames.items():
+        assert 0 < len(placebos) <= 2
+        for placebo in placebos:
+            assert frame in placebo.clues
+            assert placebo.answers[0] == placebo.answers[1] and not any(placebo.absence)
+            assert placebo.fact == "placebo: Desk, Fridge, Mug"
+            assert all(world.checker.answers(placebo.text) for world in worlds)
+    assert not any(pair.is_placebo for pair in pair_questions(worlds, types, STRICT))
+
+
+def test_a_world_until_a_moment_knows_nothing_of_later():
+    world = AskedWorld(put(MUG, DESK).steps, frozenset({MUG}), 0)
+    assert "Where did you move the mug to?" in world.candidates(frozenset())
+    assert "Where did you move the mug to?" not in world.until(1).candidates(frozenset())
+    assert len(world.until(1).history) == 2
