@@ -124,6 +124,7 @@ class NiehAnswer(
         clue_column: column in the tables by number of clues (`Question.clue_column`).
         answers: the gold answers.
         file: name of its file, in a set of several; empty elsewhere.
+        moment: number of the frame after which it is asked; None for the end.
         blind: what `blind` says to the question; None if it is not known.
         shown_clues: clue frames among the shown ones; None if they are not known, or if no frame is
             evidence.
@@ -145,6 +146,7 @@ class NiehAnswer(
     clue_column: str
     answers: Annotated[_Answers, Meta(min_length=1)]
     file: str = ""
+    moment: Count | None = None
     blind: BlindGuess | None = None
     shown_clues: ShownClues | None = None
     twin: TwinSide | None = None
@@ -172,6 +174,7 @@ class NiehAnswer(
             clue_column=question.clue_column,
             answers=question.answers,
             file=question.file,
+            moment=question.moment,
             blind=blind,
             shown_clues=shown_clues,
             twin=twin,

@@ -38,6 +38,7 @@ PARSED_PAGES = {
     "docs/policies.md": KEY,
     "docs/report.md": READERS,
     "docs/submit.md": READERS,
+    "docs/moments.md": HOURS,
     "docs/twins.md": HOURS,
     "examples/sums/README.md": ELSEWHERE,
     "examples/thumbnails/README.md": ELSEWHERE,

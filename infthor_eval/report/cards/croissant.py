@@ -66,6 +66,7 @@ _COLUMNS = {
     "answer": "gold answers, as a list; one of them is enough, or all, as the scorer says",
     "question_type": "type of the question",
     "absence": "frames that show that something is nowhere, as a list",
+    "moment": "number of the frame after which it is asked; nothing is the end",
     "pair": "pair of twins; both worlds' questions have the same",
     "fact": "what the pair is about; questions on one fact are not independent",
 }

@@ -165,6 +165,8 @@ class NiehPresenter(PlainPresenter):
         """See `Presenter.details`: evidence, `blind` and thoughts; the rest is elsewhere."""
         payload = record.payload
         details: dict[str, str] = {}
+        if payload.moment is not None:
+            details["asked after frame"] = str(payload.moment)
         if payload.shown_clues is not None:
             details["clue frames shown"] = (
                 f"{payload.shown_clues.n_shown} of {payload.shown_clues.n_clues}"

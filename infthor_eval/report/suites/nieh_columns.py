@@ -1,6 +1,7 @@
 """Columns of NIEH in the table of samples."""
 
 from functools import partial
+from typing import Any
 
 from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.nieh.results.above_blind import score_above_blind
@@ -27,7 +28,7 @@ def _recall(name: str, record: UnitRecord[NiehAnswer]) -> float | None:
     return getattr(record.payload.recall, name, None)
 
 
-def _twin(name: str, record: UnitRecord[NiehAnswer]) -> str | None:
+def _twin(name: str, record: UnitRecord[NiehAnswer]) -> Any:
     return getattr(record.payload.twin, name, None)
 
 
@@ -43,6 +44,7 @@ NIEH_COLUMNS = (
     payload_column("reply", str),
     payload_column("thinking", str),
     payload_column("file", str),
+    payload_column("moment", int),
     payload_column("n_clues", int),
     SampleColumn("n_clues_shown", int, partial(_clues, "n_shown")),
     SampleColumn("n_frames_after_clues", int, partial(_clues, "n_after")),
@@ -53,6 +55,8 @@ NIEH_COLUMNS = (
     ),
     SampleColumn("pair", str, partial(_twin, "pair")),
     SampleColumn("fact", str, partial(_twin, "fact")),
+    SampleColumn("age", int, partial(_twin, "age")),
+    SampleColumn("span", int, partial(_twin, "span")),
     SampleColumn("n_recalled", int, _n_recalled),
     SampleColumn("build_seconds", float, partial(_recall, "build_s")),
     SampleColumn("recall_seconds", float, partial(_recall, "recall_s")),

@@ -113,7 +113,7 @@ def _choose_frames(data: NiehSet, question: Question, facts: Sequence[FrameFacts
     clues = frozenset(data.clue_positions(question) if question.has_evidence else ())
     pair = data.twins.get(question.traj_id) if question.pair else None
     if pair is not None:
-        changed = _changed(pair, question.traj_id)
+        changed = _changed(pair, question.traj_id, len(frames))
         differing = choose_evenly(sorted(changed.keys() - clues), _DIFFERING)
         return _FrameChoice(frames, facts, clues, frozenset(differing), changed)
     last = len(frames) - 1
@@ -135,11 +135,11 @@ def _recalled(records: Sequence[UnitRecord[NiehAnswer] | None]) -> frozenset[int
     )
 
 
-def _changed(pair: TwinPair, traj_id: str) -> dict[int, tuple[str, ...]]:
-    """Return the types of what differs in one world's frames, by the indices of those frames."""
+def _changed(pair: TwinPair, traj_id: str, n_frames: int) -> dict[int, tuple[str, ...]]:
+    """Return the types of what differs in one world's first frames, by the indices of those."""
     is_first = traj_id == pair.traj_ids[0]
     changed = {}
-    for index, frame in enumerate(pair.frames):
+    for index, frame in enumerate(pair.frames[:n_frames]):
         if not frame.same:
             names = (name if is_first else pair.ids.get(name, name) for name in frame.changed)
             changed[index] = tuple(sorted({name.partition("|")[0] for name in names}))

@@ -143,6 +143,8 @@ def test_every_row_can_be_asked_and_oracle_has_all_pairs_at_every_age(made, run_
     kept = pairs["retention"]["kept"]
     assert [(it["age"], it["share"]) for it in kept] == [(rung, 1.0) for rung in RUNGS[: len(kept)]]
     assert pairs["retention"]["half_life"] == [kept[-1]["age"], None]
+    read_success(run_cli("report", file.parent, "--out", tmp_path / "page.html"))
+    assert '"asked after frame"' in (tmp_path / "page.html").read_text()
 
 
 def test_placebos_differ_in_a_clue_frame_and_not_in_their_answer(made):
