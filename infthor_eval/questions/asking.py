@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import groupby
 from typing import Any, Generic, Protocol, TypeVar
 
 from infthor_eval.errors import (
@@ -177,7 +176,8 @@ class Replier(Protocol):
 
 
 class ModelReplier:
-    """A model with one conversation: requests in the same context share what is encoded of it."""
+    """A model with one conversation: requests in the same context, or in beginnings of one, share
+    what is encoded of it."""
 
     def __init__(self, model: Model) -> None:
         self.batch_size = model.capabilities.batch_size
@@ -244,15 +244,16 @@ def answer_requests(
 ) -> Iterator[UnitRecord[Payload]]:
     """Yield the records of requests, in an order that depends on them alone.
 
-    Neighbours in one context are answered together, and all of them if the replier batches
-    contexts.
+    Neighbours in one context are answered together, or in contexts each of which begins the next
+    one; and all of them if the replier batches contexts.
     """
     waiting: list[Request[Payload]] = []
-    for _, in_one_context in groupby(requests, key=lambda request: request.names):
-        waiting += in_one_context
-        if not replier.batch_contexts:
+    for request in requests:
+        last = waiting[-1].names if waiting else []
+        if request.names[: len(last)] != last and not replier.batch_contexts:
             yield from _answer_in_batches(waiting, replier, session)
             waiting = []
+        waiting.append(request)
     yield from _answer_in_batches(waiting, replier, session)
 
 

@@ -250,15 +250,22 @@ def answer_units(
 
 
 def _in_order(requests: Sequence[NiehRequest]) -> list[NiehRequest]:
-    """Return requests by their contexts; of a pair, the other world's after the first one's."""
+    """Return requests by their contexts; of a pair, the other world's after the first one's.
+
+    Moments of one world follow each other, as each of their contexts begins the next one.
+    """
     worlds: dict[tuple[str, str, int], dict[str, list[str]]] = {}
+    longest: dict[str, list[str]] = {}
     for request in requests:
         worlds.setdefault(_pair(request), {})[_world(request)] = request.names
+        longest[_world(request)] = max(longest.get(_world(request), []), request.names, key=len)
 
     def place(request: NiehRequest) -> tuple[list[str], bool, list[str]]:
         names = worlds[_pair(request)]
         first = first_world(names)
-        return names[first], _world(request) != first, names[_world(request)]
+        at_end = request.unit.sample.question.moment is None
+        shown = names[first] if at_end else longest[first]
+        return shown, _world(request) != first, names[_world(request)]
 
     return sorted(requests, key=place)
 

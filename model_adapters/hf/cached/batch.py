@@ -1,4 +1,5 @@
-"""Continuations of an encoded prefix, together: in one sequence behind it, decoded in lockstep."""
+"""Continuations of an encoded prefix or of its beginnings, together: in one sequence behind it,
+decoded in lockstep."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -16,16 +17,18 @@ _Span = tuple[int, Span]  # of a branch
 
 
 class _Branches:
-    """Continuations of a prefix, each with the positions that it has alone."""
+    """Continuations of so many pieces of a prefix, each with the positions that it has alone."""
 
-    def __init__(self, model: Any, embed: Embed, prefix: Prefix, n_branches: int) -> None:
+    def __init__(self, model: Any, embed: Embed, prefix: Prefix, n_shared: Sequence[int]) -> None:
         self._model = model
         self._embed = embed
         self._prefix = prefix
-        self._ends = [prefix.end] * n_branches  # position of the next token of each
-        self._lengths = [prefix.n_tokens] * n_branches  # tokens of each, with the prefix
+        self._ends = [prefix.behind(n) for n in n_shared]  # position of the next token of each
+        self._lengths = [prefix.tokens_in(n) for n in n_shared]  # tokens of each, with the prefix
         device = model.get_input_embeddings().weight.device
-        self._attention = BranchAttention(model.get_decoder().config, prefix.n_tokens, device)
+        self._attention = BranchAttention(
+            model.get_decoder().config, prefix.n_tokens, device, tuple(self._lengths)
+        )
 
     @torch.inference_mode()
     def feed(self, continuations: Sequence[Sequence[Piece]], chunk_tokens: int) -> torch.Tensor:
@@ -101,17 +104,17 @@ def answer_together(
     *,
     prefix: Prefix,
     prompts: Sequence[Sequence[Piece]],
-    n_shared: int,
+    n_shared: Sequence[int],
     replies: Sequence[ReplyState],
     chunk_tokens: int,
 ) -> None:
-    """Decode the replies to prompts whose first `n_shared` pieces, and no more, are the same.
+    """Decode the replies to prompts whose first pieces, so many of each, are those of `prefix`.
 
     `prefix` has encoded the shared pieces and nothing more, and has no more afterwards; `replies`
     are empty, one for each prompt.
     """
-    continuations = [prompt[n_shared:] for prompt in prompts]
-    branches = _Branches(model, embed, prefix, len(prompts))
+    continuations = [prompt[n:] for prompt, n in zip(prompts, n_shared, strict=True)]
+    branches = _Branches(model, embed, prefix, n_shared)
     with prefix.extended(continuations, sum(reply.decoding.max_new_tokens for reply in replies)):
         decode_replies(branches.feed(continuations, chunk_tokens), branches.step, replies)
 
@@ -130,7 +133,7 @@ def encode_together(
     Returns:
         Logits of each next token, (continuations, vocabulary).
     """
-    branches = _Branches(model, embed, prefix, len(continuations))
+    branches = _Branches(model, embed, prefix, [prefix.n_pieces] * len(continuations))
     with prefix.extended(continuations, 0):
         branches.feed([pieces[:-1] for pieces in continuations], chunk_tokens)
         return branches.step(dict(enumerate(token_ids([pieces[-1] for pieces in continuations]))))

@@ -1,9 +1,10 @@
 """Attention of several continuations of one prefix that stand behind it in one sequence.
 
-Every token attends to the prefix and to the earlier tokens of its own continuation, as far as the
-model lets it: which of them a layer sees (all, a window, a chunk) is asked of the model's own mask
-functions, with the positions that the tokens have in prefix and continuation. So keys and values of
-the prefix are stored once and read once for all continuations, as in Hydragen (arXiv:2402.05099).
+Every token attends to the prefix, or to the beginning of it that its continuation continues, and to
+the earlier tokens of its own continuation, as far as the model lets it: which of them a layer sees
+(all, a window, a chunk) is asked of the model's own mask functions, with the positions that the
+tokens have in prefix and continuation. So keys and values of the prefix are stored once and read
+once for all continuations, as in Hydragen (arXiv:2402.05099).
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -85,16 +86,21 @@ class BranchAttention:
     Args:
         config: config of the decoder.
         n_prefix: tokens of the prefix.
+        seen: how many of them each branch continues; all where it is empty.
         device: device of the decoder's inputs.
 
     Attributes:
         windows: sizes of the windows and chunks that the model's masks had, in tokens.
     """
 
-    def __init__(self, config: Any, n_prefix: int, device: torch.device) -> None:
+    def __init__(
+        self, config: Any, n_prefix: int, device: torch.device, seen: Sequence[int] = ()
+    ) -> None:
         self.windows: set[int] = set()
         self._config = config
         self._n_prefix = n_prefix
+        is_cut = any(length < n_prefix for length in seen)
+        self._seen = torch.tensor(seen, device=device) if is_cut else None
         # Branch of each token behind the prefix.
         self._branches = torch.empty(0, dtype=torch.long, device=device)
         # Position of every token, the prefix's too, in prefix and branch.
@@ -220,5 +226,8 @@ class BranchAttention:
         if seen.shape[-2:] != (self._n_new, len(self._positions)):  # it goes by one of both
             seen = seen.expand(1, 1, self._n_new, len(self._positions)).clone()
         # In place, because a copy for every token would be as long as the context.
-        seen[..., self._n_prefix :] &= self._branches == self._branches[-self._n_new :, None]
+        new = self._branches[-self._n_new :, None]
+        seen[..., self._n_prefix :] &= self._branches == new
+        if self._seen is not None:
+            seen[..., : self._n_prefix] &= self._positions[: self._n_prefix] < self._seen[new]
         return seen

@@ -17,7 +17,7 @@ from model_adapters.hf.limits import check_limit, wrap_memory_errors, wrap_model
 from model_adapters.hf.loading.loaded import LoadedCheckpoint
 from model_adapters.hf.loading.rope import take_length_rope
 from model_adapters.hf.prompting.ahead import Ahead
-from model_adapters.hf.prompting.prompt import Piece, n_common, n_tokens, token_ids
+from model_adapters.hf.prompting.prompt import Piece, n_common, n_nested, n_tokens, token_ids
 from model_adapters.options.checkpoints import HfOptions
 from model_adapters.protocols import Decoding, Reply, Turn
 
@@ -125,7 +125,7 @@ class TransformersModel(HfModel):
             begin_reply(self._loaded, decoding, token_ids(prompt), keep_margins=margins)
             for prompt in prompts
         ]
-        decode = self._decode_branches if self._can_branch(prompts) else self._decode_each
+        decode = self._decode_branches if self._n_shared(prompts) else self._decode_each
         try:
             with (
                 wrap_model_errors(self.name),
@@ -142,12 +142,15 @@ class TransformersModel(HfModel):
             for reply, prompt, cached in zip(replies, prompts, n_cached, strict=True)
         ]
 
-    def _can_branch(self, prompts: Sequence[Sequence[Piece]]) -> bool:
-        """Return whether replies to prompts can be decoded together."""
-        if len(prompts) == 1 or not self._embed.sees_ahead:
-            return len(prompts) > 1
-        common = n_common(prompts)
-        return all(isinstance(piece, int) for prompt in prompts for piece in prompt[common:])
+    def _n_shared(self, prompts: Sequence[Sequence[Piece]]) -> list[int]:
+        """Return how many pieces of each prompt are encoded once, where replies to them can be
+        decoded together; nothing where not."""
+        if len(prompts) == 1:
+            return []
+        shared = n_nested(prompts)
+        if not shared and not self._embed.sees_ahead:
+            shared = [n_common(prompts)] * len(prompts)
+        return shared
 
     def _decode_each(
         self, prompts: Sequence[Sequence[Piece]], replies: Sequence[ReplyState]
@@ -171,20 +174,23 @@ class TransformersModel(HfModel):
         self, prompts: Sequence[Sequence[Piece]], replies: Sequence[ReplyState]
     ) -> list[int]:
         """Decode replies together; return how many tokens of each prompt were in the cache."""
-        common = n_common(prompts)
-        shared = min(self._prefix.rewind_to(prompts[0]), common)
-        # The cached sequence may share more with the first prompt than all prompts share.
-        self._prefix.cut(shared)
-        cached = self._prefix.n_tokens
-        if shared < common:
-            self._prefix.feed(prompts[0][shared:common])
+        n_shared = self._n_shared(prompts)
+        most = max(n_shared)
+        longest = prompts[n_shared.index(most)]
+        cached = min(self._prefix.rewind_to(longest), most)
+        # The cached sequence may share more with that prompt than others do.
+        self._prefix.cut(cached)
+        n_cached = self._prefix.n_tokens
+        if cached < most:
+            self._prefix.feed(longest[cached:most])
         answer_together(
             self._loaded.model,
             self._embed,
             prefix=self._prefix,
             prompts=prompts,
-            n_shared=common,
+            n_shared=n_shared,
             replies=replies,
             chunk_tokens=self._chunk_tokens,
         )
-        return [cached, *[self._prefix.n_tokens] * (len(prompts) - 1)]
+        in_cache = [self._prefix.tokens_in(n) for n in n_shared]
+        return [min(n_cached, in_cache[0]), *in_cache[1:]]

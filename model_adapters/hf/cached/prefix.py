@@ -64,7 +64,20 @@ class Prefix:
     @property
     def n_tokens(self) -> int:
         """Tokens in the sequence."""
-        return self._ends[-1] if self._ends else 0
+        return self.tokens_in(self.n_pieces)
+
+    @property
+    def n_pieces(self) -> int:
+        """Pieces in the sequence."""
+        return len(self._pieces)
+
+    def tokens_in(self, n_pieces: int) -> int:
+        """Return the tokens of the first pieces."""
+        return self._ends[n_pieces - 1] if n_pieces else 0
+
+    def behind(self, n_pieces: int) -> int:
+        """Return the position behind the first pieces."""
+        return self._starts[n_pieces]
 
     @property
     def end(self) -> int:
@@ -107,7 +120,7 @@ class Prefix:
             if ours is not theirs and ours != theirs:
                 break
             shared += 1
-        n_tokens = self._cache.cut_before(self._ends[shared - 1] if shared else 0)
+        n_tokens = self._cache.cut_before(self.tokens_in(shared))
         shared = bisect_right(self._ends, n_tokens, hi=shared)
         self.cut(shared)
         return shared

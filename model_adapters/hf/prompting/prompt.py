@@ -76,6 +76,23 @@ def n_common(prompts: Sequence[Sequence[Piece]]) -> int:
     return len(first) - 1
 
 
+def n_nested(prompts: Sequence[Sequence[Piece]]) -> list[int]:
+    """Return how many pieces of each prompt begin the one with the most frames, where those are all
+    of its frames; nothing where one has others."""
+    ends = [
+        max((at for at, piece in enumerate(prompt, 1) if not isinstance(piece, int)), default=0)
+        for prompt in prompts
+    ]
+    longest = max(ends)
+    whole = [prompt for prompt, end in zip(prompts, ends, strict=True) if end == longest]
+    common = n_common(whole)
+    shared = [
+        common if end == longest else n_common([prompt, whole[0]])
+        for prompt, end in zip(prompts, ends, strict=True)
+    ]
+    return shared if all(n >= end for n, end in zip(shared, ends, strict=True)) else []
+
+
 def token_ids(pieces: Iterable[Piece]) -> Iterator[int]:
     """Yield all token ids of a prompt, frames and clips expanded."""
     for piece in pieces:

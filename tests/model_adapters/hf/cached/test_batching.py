@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from infthor_eval.errors import ModelError
 from model_adapters import load
-from model_adapters.hf.prompting.prompt import n_common
+from model_adapters.hf.prompting.prompt import n_common, n_nested
 
 from ...asking import ask, talk_of, up_to, user
 
@@ -47,6 +47,63 @@ def test_replies_are_those_of_asking_one_by_one(batching, tiny, frames, start, c
         expected = ask(tiny, *parts, new=5, stop=stop)
         assert (reply.text, reply.token_ids) == (expected.text, expected.token_ids)
         assert reply.n_context_tokens == expected.n_context_tokens
+
+
+NESTED = st.lists(
+    st.tuples(st.integers(0, 6), st.sampled_from(["\nWhat?", "\nWhere was it then?", "mug"])),
+    min_size=2,
+    max_size=7,
+)
+
+
+@pytest.mark.parametrize("name", ["qwen2.5-vl-tiny", "pixtral-tiny", "llava-onevision-tiny"])
+@settings(max_examples=12, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(asked=NESTED)
+def test_beginnings_of_one_context_are_answered_together_as_one_by_one(name, asked, models, frames):
+    together, alone = models[name]
+    shown = [*frames, *frames[:1]]
+    contexts = [[*shown[:n], text] for n, text in asked]
+    replies = together.conversation().replies(contexts, up_to(5))
+    for context, reply in zip(contexts, replies, strict=True):
+        expected = ask(alone, *context, new=5)
+        assert (reply.text, reply.token_ids) == (expected.text, expected.token_ids)
+        assert reply.context_hash == expected.context_hash
+        assert reply.frames_hash == expected.frames_hash
+
+
+@pytest.fixture(scope="module")
+def models():
+    """Models that answer several together, and those that encode every prompt as a whole."""
+    options = {"batch_size": "5", "chunk_tokens": "30"}
+    return {
+        name: (load(name, options, seed=0), load(name, {"share_prefix": "false"}, seed=0))
+        for name in ("qwen2.5-vl-tiny", "pixtral-tiny", "llava-onevision-tiny")
+    }
+
+
+def test_the_longest_context_is_encoded_once_for_all_its_beginnings(batching, frames):
+    contexts = [[*frames[:n], "\nIs it here?"] for n in (2, 4, 6)]
+    replies = batching.conversation().replies(contexts, up_to(2))
+    assert [reply.n_cached_tokens for reply in replies][1:] == sorted(
+        reply.n_cached_tokens for reply in replies[1:]
+    )
+    per_frame = batching.tokens_per_frame(frames[0])
+    for reply in replies[1:]:
+        assert reply.n_context_tokens - reply.n_cached_tokens < per_frame + 30
+
+
+@pytest.mark.parametrize(
+    ("prompts", "shared"),
+    [
+        ([["a", 1, 2], ["a", "b", 1, 2], ["a", "b", 1, 3]], [1, 3, 3]),
+        ([["a", 1], ["b", 1]], []),
+        ([["a", "b", 1], ["b", 1]], []),
+        ([[1, 2], ["a", 1, 2]], [0, 2]),
+        ([["a", 1, 2], ["a", 1, 3]], [2, 2]),
+    ],
+)
+def test_which_prompts_are_beginnings_of_the_one_with_most_frames(prompts, shared):
+    assert n_nested(prompts) == shared
 
 
 def test_a_window_slides_over_the_prefix_and_each_continuation(frames):
