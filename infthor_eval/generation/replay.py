@@ -84,6 +84,8 @@ def replay(
     digest: str,
     frames: int = 1,
     on_progress: OnProgress = ignore_progress,
+    *,
+    needs_all: bool = False,
 ) -> ReplayReport:
     """Run a trajectory and write its frames and logs into a folder.
 
@@ -98,14 +100,20 @@ def replay(
         frames: number of frames of each action that moves the agent or its camera; other actions
             have one.
         on_progress: called after each action.
+        needs_all: True to end where the scene cannot be restored, and at the first refusal; no log
+            is written then.
     """
     report = ReplayReport(trajectory.traj_id, digest, trajectory.scene.floor_plan, frames)
     actions = ActionReplay(simulator, trajectory, report, on_progress)
+    if needs_all and report.restore:
+        return report
     (folder / "img").mkdir()
     with PngWriter(folder / "img") as frame_files:
         run = _Run(simulator, actions, frame_files, frames)
         for index, low in enumerate(trajectory.plan.low_actions):
             run.act(index, low)
+            if needs_all and report.refusals:
+                return report
     steps = run.recorder.steps
     write_steps(folder, steps)
     (folder / "traj.txt").write_text(sequence_text(trajectory, steps) + "\n")

@@ -7,6 +7,7 @@ its gold answer, and no smaller set of clues does.
 """
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
 
 from infthor_eval.formats.question import Question
@@ -45,6 +46,12 @@ class Checker:
         self._whole = frame_facts(steps)
         shown = facts_shown(steps, self._whole, share)
         self._single = {frame.number: frame for frame in shown}
+
+    def until(self, moment: int) -> "Checker":
+        """Return the checker of the log up to a frame, which shares its facts."""
+        part = copy(self)
+        part._whole = self._whole[: moment + 1]
+        return part
 
     def verdict(self, question: Question) -> Verdict:
         """Check one question.

@@ -71,6 +71,7 @@ class TrajectoryHistory:
     Attributes:
         traj_id: name of the trajectory's folder.
         steps: the log.
+        share: share of the frame that an object must fill to count as shown.
         min_pixels: minimum size of an object that counts as shown, pixels: `share` of the frame;
             more by `SHARE_FACTOR` for some types.
     """
@@ -83,10 +84,20 @@ class TrajectoryHistory:
             )
         self.traj_id = traj_id
         self.steps = steps
+        self.share = share
         self.min_pixels = share * _SIDE**2
         self._states = list(_snapshots(steps))
         self._parents = list(_parents(self._states))
         self._contents: dict[tuple[int, str], frozenset[str]] = {}  # by map of parents
+
+    def until(self, moment: int) -> "TrajectoryHistory":
+        """Return what has happened by a frame; what is known of single frames is shared."""
+        end = moment + 1
+        part = TrajectoryHistory(self.traj_id, self.steps[:1], self.share)
+        part.steps = self.steps[:end]
+        part._states, part._parents = self._states[:end], self._parents[:end]
+        part._contents = self._contents
+        return part
 
     def __len__(self) -> int:
         return len(self.steps)

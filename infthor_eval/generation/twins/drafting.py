@@ -144,7 +144,7 @@ class Replays:
     def _replay(self, world: Trajectory) -> Replayed | str:
         folder = self._stack.enter_context(ScratchFolder()) / _WORLD
         folder.mkdir()
-        report = replay(world, self.simulator, folder, "")
+        report = replay(world, self.simulator, folder, "", needs_all=True)
         if report.restore:
             return "its start cannot be restored"
         if report.refusals:
@@ -212,8 +212,8 @@ class _Maker:
             _check_insertions(world, worlds.inserted)
         seed = self._draft.settings.seed
         asked = (
-            AskedWorld(first.steps, worlds.changed, seed),
-            AskedWorld(second.steps, worlds.changed_in_second, seed),
+            AskedWorld.of(first.steps, worlds.changed, seed),
+            AskedWorld.of(second.steps, worlds.changed_in_second, seed),
         )
         check_original(worlds.has_own, self._episode.history.steps, *asked)
         questions = self._ask(asked, worlds, frames)

@@ -114,7 +114,7 @@ def read_episode(trajectory: Trajectory, simulator: Simulator) -> Episode:
     with ScratchFolder() as scratch:
         folder = Path(scratch) / "replay"
         folder.mkdir()
-        report = replay(trajectory, simulator, folder, "")
+        report = replay(trajectory, simulator, folder, "", needs_all=True)
         if report.refusals:
             first = report.refusals[0]
             raise DataError(f"step {first.step}: {first.action}: {first.error}; {_HINT}")

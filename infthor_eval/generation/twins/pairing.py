@@ -11,7 +11,6 @@ else because frames differ is wrong.
 import random
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
-from functools import cached_property
 from itertools import islice
 
 from infthor_eval.formats.question import Answer
@@ -36,28 +35,27 @@ class AskedWorld:
     """One of two worlds, with the questions that the rules ask there.
 
     Attributes:
-        steps: its log.
+        history: what happened.
+        checker: the solver on its log.
         changed: ids, in this world, of the objects that may differ.
         seed: seed of the rules' draws, the same in both worlds.
     """
 
-    steps: Sequence[Step]
+    history: TrajectoryHistory
+    checker: Checker
     changed: frozenset[str]
     seed: int
 
+    @classmethod
+    def of(cls, steps: Sequence[Step], changed: frozenset[str], seed: int) -> "AskedWorld":
+        """Return the world of a log."""
+        history = TrajectoryHistory("twin", list(steps))
+        return cls(history, Checker(steps, DEFAULT_SHARE), changed, seed)
+
     def until(self, moment: int) -> "AskedWorld":
         """Return the world as it is known after a frame."""
-        return replace(self, steps=self.steps[: moment + 1])
-
-    @cached_property
-    def history(self) -> TrajectoryHistory:
-        """What happened."""
-        return TrajectoryHistory("twin", list(self.steps))
-
-    @cached_property
-    def checker(self) -> Checker:
-        """The solver on its log."""
-        return Checker(self.steps, DEFAULT_SHARE)
+        history, checker = self.history.until(moment), self.checker.until(moment)
+        return replace(self, history=history, checker=checker)
 
     def candidates(self, vocabulary: frozenset[str]) -> Mapping[str, Candidate]:
         """Return the questions that the rules ask, by their text."""

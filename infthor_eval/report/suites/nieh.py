@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from statistics import fmean
 
+from infthor_eval.distances import age_class
 from infthor_eval.nieh.records import BlindGuess, NiehAnswer
 from infthor_eval.nieh.rescoring.judging import JUDGED
 from infthor_eval.nieh.results.above_blind import score_above_blind, score_range
@@ -35,6 +36,7 @@ from infthor_eval.runs import UnitRecord
 
 Record = UnitRecord[NiehAnswer]
 _ABOVE_BLIND = ", above blind"
+_AT_AGE = ", age "
 _BOUNDS = {
     "strict": (0.0, 1.0),
     "reference": (0.0, math.inf),
@@ -90,7 +92,7 @@ class NiehPresenter(PlainPresenter):
     def bounds(self, metric: str) -> tuple[float, float]:
         """See `Presenter.bounds`: the reference scorer exceeds 1 on repetitions; scores above
         `blind`, of a part of a set, can be anything, and so can a task's own metrics."""
-        return _BOUNDS.get(metric, (-math.inf, math.inf))
+        return _BOUNDS.get(metric.partition(_AT_AGE)[0], (-math.inf, math.inf))
 
     def extra_scores(self, record: Record) -> Mapping[str, float]:
         """See `Presenter.extra_scores`: scores above `blind` where that does not solve all."""
@@ -123,13 +125,23 @@ class NiehPresenter(PlainPresenter):
         return "" if twin is None else twin.pair
 
     def group_scores(self, records: Sequence[Record]) -> Iterator[GroupScore]:
-        """See `Presenter.group_scores`: net pairs of twins."""
+        """See `Presenter.group_scores`: net pairs of twins, at moments also those of each age."""
+        ages = {
+            record.payload.twin.pair: age_class(record.payload.twin.age)
+            for record in records
+            if record.payload.moment is not None
+            and record.payload.twin is not None
+            and record.payload.twin.age is not None
+        }
         metrics = dict.fromkeys(name for record in records for name in record.payload.scores)
         metric = self.main_metric if self.main_metric in metrics else next(iter(metrics), "")
         for pair in score_pairs(records, metric):
             group = " ".join(filter(None, (pair.pair, pair.variant)))
             for name, score in pair.shares.by_metric.items():
                 yield GroupScore(name, group, pair.cluster, score)
+            if pair.pair in ages:
+                name = f"net_pairs{_AT_AGE}{ages[pair.pair]}"
+                yield GroupScore(name, group, pair.cluster, pair.shares.net)
 
     def opening(self, runs: Sequence[Run]) -> Section | None:
         """See `Presenter.opening`: pairs of twins, if there are any."""

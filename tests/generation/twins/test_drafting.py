@@ -368,7 +368,7 @@ def asked(*shown):
     """A world of one frame that shows some of what changed."""
     log = history({FRIDGE: object_state(FRIDGE), OVEN: object_state(OVEN)})
     log.steps[0].seen = {key: ObjectInFrame(4000, (0, 0, 39, 99)) for key in shown}
-    return AskedWorld(log.steps, WORLDS.changed, 0)
+    return AskedWorld.of(log.steps, WORLDS.changed, 0)
 
 
 def test_a_world_that_hides_what_the_other_shows_is_no_twin_of_the_episode():

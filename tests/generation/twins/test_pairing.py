@@ -19,7 +19,7 @@ STRICT = partial(score, scorer="strict")
 def paired(first, second, *types, scorer=STRICT):
     """The paired questions by their text."""
     changed = frozenset(key for key in (MUG, APPLE, BOOK) if key.partition("|")[0] in types)
-    worlds = (AskedWorld(first.steps, changed, 0), AskedWorld(second.steps, changed, 0))
+    worlds = (AskedWorld.of(first.steps, changed, 0), AskedWorld.of(second.steps, changed, 0))
     return {pair.text: pair for pair in pair_questions(worlds, frozenset(types), scorer)}
 
 
@@ -116,7 +116,7 @@ def test_both_answers_must_follow_from_the_clues(shown):
 
 def test_a_placebo_differs_in_a_clue_frame_and_not_in_its_answer():
     first, second = put(MUG, DESK), put(MUG, FRIDGE)
-    worlds = tuple(AskedWorld(log.steps, frozenset({MUG}), 0) for log in (first, second))
+    worlds = tuple(AskedWorld.of(log.steps, frozenset({MUG}), 0) for log in (first, second))
     types = frozenset({"Mug", "Desk", "Fridge"})
     by_frames = {
         frame: [pair for pair in pair_questions(worlds, types, STRICT, {frame}) if pair.is_placebo]
@@ -133,7 +133,7 @@ def test_a_placebo_differs_in_a_clue_frame_and_not_in_its_answer():
 
 
 def test_a_world_until_a_moment_knows_nothing_of_later():
-    world = AskedWorld(put(MUG, DESK).steps, frozenset({MUG}), 0)
+    world = AskedWorld.of(put(MUG, DESK).steps, frozenset({MUG}), 0)
     assert "Where did you move the mug to?" in world.candidates(frozenset())
     assert "Where did you move the mug to?" not in world.until(1).candidates(frozenset())
     assert len(world.until(1).history) == 2
