@@ -379,9 +379,9 @@ def test_a_world_that_hides_what_the_other_shows_is_no_twin_of_the_episode():
 
 
 def test_of_two_edited_worlds_none_looks_as_the_episode():
-    episode = asked(FRIDGE, OVEN).steps
+    episode = asked(FRIDGE, OVEN).history.steps
     larger = asked(FRIDGE, OVEN)
-    larger.steps[0].seen[FRIDGE] = ObjectInFrame(4100, (0, 0, 40, 99))
+    larger.history.steps[0].seen[FRIDGE] = ObjectInFrame(4100, (0, 0, 40, 99))
     check_original(False, episode, larger, asked(FRIDGE))
     check_original(False, [*episode, *episode], larger, asked(FRIDGE, OVEN))
     for pair in ((asked(FRIDGE, OVEN), larger), (larger, asked(FRIDGE, OVEN))):
