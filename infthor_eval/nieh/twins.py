@@ -6,7 +6,6 @@ from functools import lru_cache
 from infthor_eval.errors import DataError
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
-from infthor_eval.formats.twins import TwinPair
 from infthor_eval.nieh.contexts.base import QuestionVariant
 from infthor_eval.nieh.records import TwinSide
 from infthor_eval.nieh.samples import TaskSamples
@@ -53,6 +52,8 @@ def _side(
     if shown is not None and true is not None:
         n_differing = sum(not pair.frames[at].same for at in true if at < len(pair.frames))
         n_after_clues = sum(position > max(clues) for position in shown)
+    last = len(pair.frames) - 1 if question.moment is None else question.moment
+    evidence = pair.evidence(last)
     return TwinSide(
         pair=question.pair,
         fact=question.fact,
@@ -62,16 +63,10 @@ def _side(
         n_frames=None if shown is None else len(shown),
         n_differing=n_differing,
         n_after_clues=n_after_clues,
-        **_ages(pair, question, min(clues)),
+        age=None if evidence is None else last - evidence,
+        span=max(0, last - min(clues)),
+        length=last + 1,
     )
-
-
-def _ages(pair: TwinPair, question: Question, oldest: int) -> dict[str, int | None]:
-    """Return age, span and length of a question whose oldest clue is at a position (`TwinSide`)."""
-    last = len(pair.frames) - 1 if question.moment is None else question.moment
-    evidence = pair.evidence(last)
-    age = None if evidence is None else last - evidence
-    return {"age": age, "span": max(0, last - oldest), "length": last + 1}
 
 
 def _other(data: NiehSet, question: Question) -> Question:

@@ -9,6 +9,7 @@ that something was put (in the hand in the first, elsewhere in the second) or op
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from itertools import pairwise
 
 from infthor_eval.formats.step_log import ObjectState, Step, iter_object_states
@@ -96,11 +97,13 @@ def _large_objects(step: Step, facts: FrameFacts, share: float) -> dict[str, Obj
     }
 
 
+@cache
 def plain_name(object_type: str) -> str:
     """Return a type as answers have it: in small letters, and a basin as its whole."""
     return object_type.lower().replace(" ", "").removesuffix("basin")
 
 
+@cache
 def named_type(words: str) -> str:
     """Return the type for some words: "sliced apple" is AppleSliced."""
     words = words.lower()

@@ -48,6 +48,8 @@ def _what(history: TrajectoryHistory, receptacle: str) -> Iterator[Candidate]:
     last = len(history) - 1
     states = history.states(last)
     inside = history.contents(last, receptacle)
+    if not inside or len(inside) > MANY or not is_plain(history, last, receptacle):
+        return
     since = {item: _arrival(history, item, receptacle) for item in inside}
     shown = {}
     for frame in range(min(since.values(), default=0), len(history)):
@@ -58,8 +60,6 @@ def _what(history: TrajectoryHistory, receptacle: str) -> Iterator[Candidate]:
         is_final = held <= inside and all(frame >= since[key] for key in held)
         if history.shows(frame, receptacle) and is_final:
             shown[frame] = frozenset(key for key in held if history.shows_inside(frame, key))
-    if not inside or len(inside) > MANY or not is_plain(history, last, receptacle):
-        return
     clues = minimal_cover(inside, shown, lambda frame, keys: history.clarity(frame, *keys))
     if clues is None:
         return

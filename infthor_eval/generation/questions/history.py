@@ -89,6 +89,7 @@ class TrajectoryHistory:
         self._states = list(_snapshots(steps))
         self._parents = list(_parents(self._states))
         self._contents: dict[tuple[int, str], frozenset[str]] = {}  # by map of parents
+        self._shown: dict[int, frozenset[str]] = {}  # by frame
 
     def until(self, moment: int) -> "TrajectoryHistory":
         """Return what has happened by a frame; what is known of single frames is shared."""
@@ -96,7 +97,7 @@ class TrajectoryHistory:
         part = TrajectoryHistory(self.traj_id, self.steps[:1], self.share)
         part.steps = self.steps[:end]
         part._states, part._parents = self._states[:end], self._parents[:end]
-        part._contents = self._contents
+        part._contents, part._shown = self._contents, self._shown
         return part
 
     def __len__(self) -> int:
@@ -112,13 +113,18 @@ class TrajectoryHistory:
 
     def shows(self, frame: int, *ids: str) -> bool:
         """Return True if a frame shows all these objects large enough, and not by a sliver."""
-        seen = self.objects_in_frame(frame)
-        return all(
-            key in seen
-            and seen[key].inside >= _LEAST_INSIDE
-            and seen[key].pixels >= self.min_pixels * SHARE_FACTOR.get(key.partition("|")[0], 1.0)
-            for key in ids
-        )
+        return self.shown_in(frame).issuperset(ids)
+
+    def shown_in(self, frame: int) -> frozenset[str]:
+        """Return the ids of the objects that a frame shows so."""
+        if frame not in self._shown:
+            self._shown[frame] = frozenset(
+                key
+                for key, seen in self.objects_in_frame(frame).items()
+                if seen.inside >= _LEAST_INSIDE
+                and seen.pixels >= self.min_pixels * SHARE_FACTOR.get(key.partition("|")[0], 1.0)
+            )
+        return self._shown[frame]
 
     def shows_whether_open(self, frame: int, item: str) -> bool:
         """Return True if a frame shows an object, and of it what tells whether it is open."""
@@ -207,12 +213,7 @@ class TrajectoryHistory:
     @cached_property
     def seen(self) -> frozenset[str]:
         """Ids of the objects that a frame shows large enough."""
-        return frozenset(
-            key
-            for frame in range(len(self))
-            for key in self.objects_in_frame(frame)
-            if self.shows(frame, key)
-        )
+        return frozenset[str]().union(*map(self.shown_in, range(len(self))))
 
     @cached_property
     def best_frames(self) -> dict[str, int]:
@@ -220,8 +221,8 @@ class TrajectoryHistory:
         best: dict[str, tuple[tuple[bool, int], int]] = {}
         for frame in range(len(self)):
             states = self.states(frame)
-            for key in self.objects_in_frame(frame):
-                if key in states and self.shows(frame, key):
+            for key in self.shown_in(frame):
+                if key in states:
                     sighting = self.clarity(frame, key), -frame
                     best[states[key].type] = max(sighting, best.get(states[key].type, sighting))
         return {object_type: -negated for object_type, (_, negated) in sorted(best.items())}
@@ -329,8 +330,11 @@ class TrajectoryHistory:
         parents = self._parents[frame]
         known = id(parents), receptacle
         if known not in self._contents:
-            inside = (key for key in parents if self.is_inside(frame, key, receptacle))
-            self._contents[known] = frozenset(inside)
+            self._contents[known] = frozenset(
+                key
+                for key, parent in parents.items()
+                if parent is not None and is_same_object(parent, receptacle)
+            )
         return self._contents[known]
 
     def is_inside(self, frame: int, item: str, receptacle: str) -> bool:

@@ -318,7 +318,9 @@ def check_original(
     if has_own and n_seen != n_seen_there:
         raise Difference("one world shows a changed object that the other hides")
     own = [step.seen for step in episode]
-    if not has_own and own in ([step.seen for step in one.history.steps] for one in (first, second)):
+    if not has_own and own in (
+        [step.seen for step in one.history.steps] for one in (first, second)
+    ):
         raise Difference("a world looks as the episode does")
 
 

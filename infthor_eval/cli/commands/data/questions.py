@@ -14,7 +14,7 @@ from infthor_eval.cli.options.workers import parse_worker_settings, worker_optio
 from infthor_eval.errors import UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     from rich.console import Console
 
@@ -257,6 +257,7 @@ def _parse_rungs(text: str | None) -> tuple[int, ...]:
 def _print(summary: TwinSummary | FinalTaskSummary, output: Console) -> None:
     from infthor_eval.generation.twins.twin_set import TwinSummary
 
+    tables: list[tuple[str, Mapping[Any, int]]]
     if isinstance(summary, TwinSummary):
         found = f"{summary.pairs} paired questions of {summary.found} on {summary.facts} facts"
         if summary.by_age:
