@@ -89,15 +89,17 @@ class TrajectoryHistory:
         self._states = list(_snapshots(steps))
         self._parents = list(_parents(self._states))
         self._contents: dict[tuple[int, str], frozenset[str]] = {}  # by map of parents
-        self._shown: dict[int, frozenset[str]] = {}  # by frame
+        self._shown: dict[int, dict[str, tuple[bool, int]]] = {}  # by frame
 
     def until(self, moment: int) -> "TrajectoryHistory":
         """Return what has happened by a frame; what is known of single frames is shared."""
         end = moment + 1
         part = TrajectoryHistory(self.traj_id, self.steps[:1], self.share)
         part.steps = self.steps[:end]
-        part._states, part._parents = self._states[:end], self._parents[:end]
-        part._contents, part._shown = self._contents, self._shown
+        part._states = self._states[:end]
+        part._parents = self._parents[:end]
+        part._contents = self._contents
+        part._shown = self._shown
         return part
 
     def __len__(self) -> int:
@@ -113,17 +115,17 @@ class TrajectoryHistory:
 
     def shows(self, frame: int, *ids: str) -> bool:
         """Return True if a frame shows all these objects large enough, and not by a sliver."""
-        return self.shown_in(frame).issuperset(ids)
+        return self.shown_in(frame).keys() >= set(ids)
 
-    def shown_in(self, frame: int) -> frozenset[str]:
-        """Return the ids of the objects that a frame shows so."""
+    def shown_in(self, frame: int) -> Mapping[str, tuple[bool, int]]:
+        """Return how well a frame shows each object that it shows so (`clarity`), by id."""
         if frame not in self._shown:
-            self._shown[frame] = frozenset(
-                key
+            self._shown[frame] = {
+                key: self.clarity(frame, key)
                 for key, seen in self.objects_in_frame(frame).items()
                 if seen.inside >= _LEAST_INSIDE
                 and seen.pixels >= self.min_pixels * SHARE_FACTOR.get(key.partition("|")[0], 1.0)
-            )
+            }
         return self._shown[frame]
 
     def shows_whether_open(self, frame: int, item: str) -> bool:
@@ -221,9 +223,9 @@ class TrajectoryHistory:
         best: dict[str, tuple[tuple[bool, int], int]] = {}
         for frame in range(len(self)):
             states = self.states(frame)
-            for key in self.shown_in(frame):
+            for key, clarity in self.shown_in(frame).items():
                 if key in states:
-                    sighting = self.clarity(frame, key), -frame
+                    sighting = clarity, -frame
                     best[states[key].type] = max(sighting, best.get(states[key].type, sighting))
         return {object_type: -negated for object_type, (_, negated) in sorted(best.items())}
 

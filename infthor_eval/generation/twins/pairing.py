@@ -54,8 +54,7 @@ class AskedWorld:
 
     def until(self, moment: int) -> "AskedWorld":
         """Return the world as it is known after a frame."""
-        history, checker = self.history.until(moment), self.checker.until(moment)
-        return replace(self, history=history, checker=checker)
+        return replace(self, history=self.history.until(moment), checker=self.checker.until(moment))
 
     def candidates(self, vocabulary: frozenset[str]) -> Mapping[str, Candidate]:
         """Return the questions that the rules ask, by their text."""
@@ -243,15 +242,15 @@ def _paired(
 ) -> PairedQuestion:
     first, second = sides
     subjects = {canonical_type(name) for name in (*first.subjects, *second.subjects)}
-    topic = first.question_type.removesuffix("_further")
     about = sorted((_types_asked_of(first) & types) or subjects & types)
+    fact = f"{first.question_type.removesuffix('_further')}: {', '.join(about)}"
     if first.answers == second.answers:
-        topic, about = "placebo", sorted(types)
+        fact = f"placebo: {', '.join(sorted(types))}"
     return PairedQuestion(
         text=first.text,
         form=first.form,
         question_type=first.question_type,
-        fact=f"{topic}: {', '.join(about)}",
+        fact=fact,
         answers=(first.answers, second.answers),
         clues=clues,
         own_clues=(first.clues, second.clues),

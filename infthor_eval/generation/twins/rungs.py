@@ -37,10 +37,9 @@ def ladders(frames: Sequence[ComparedFrame], rungs: Sequence[int]) -> list[list[
         rungs: numbers of frames since the evidence, ascending.
     """
     differing = [at for at, frame in enumerate(frames) if not frame.same]
-    found = [
-        [evidence + rung for rung in rungs if evidence + rung < following]
-        for evidence, following in pairwise([*differing, len(frames)])
-    ]
+    found = []
+    for evidence, following in pairwise([*differing, len(frames)]):
+        found.append([evidence + rung for rung in rungs if evidence + rung < following])
     reaching = sorted(found, key=lambda moments: (-len(moments), moments))
     return [moments for moments in reaching[:_MOST] if moments]
 

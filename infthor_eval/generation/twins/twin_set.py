@@ -10,6 +10,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import chain
 from pathlib import Path
 from typing import Generic, TypeVar
 
@@ -234,12 +235,7 @@ class _Numbers:
     def summary(self, n_resumed: int, failures: list[str], seconds: float) -> TwinSummary:
         """Return the numbers of the set."""
         proposed, kept, rejected = _count_edits(self.drafts)
-        found = [
-            question
-            for draft in self.drafts
-            for pair in draft.pairs
-            for question in _ChosenQuestion.of_pair(pair)
-        ]
+        found = [_questions(draft.pairs, are_placebos=False) for draft in self.drafts]
         placebos = [len(one.rungs) for one in self.chosen if one.question.is_placebo]
         paired = [one for one in self.chosen if not one.question.is_placebo]
         return TwinSummary(
@@ -248,7 +244,7 @@ class _Numbers:
             proposed=proposed,
             kept=kept,
             rejected=rejected,
-            found=sum(not one.question.is_placebo for one in found),
+            found=sum(map(len, found)),
             pairs=len(paired),
             facts=len({one.fact for one in paired}),
             by_kind=dict(Counter(one.pair.kind for one in paired).most_common()),
@@ -270,15 +266,17 @@ def choose_pairs(
         trajectories: the pairs of worlds of each trajectory.
         per_trajectory: most questions of one trajectory; at several moments, one counts once.
     """
-    found = [
-        [question for pair in pairs for question in _ChosenQuestion.of_pair(pair)]
-        for pairs in trajectories
-    ]
-    paired = [[one for one in candidates if not one.question.is_placebo] for candidates in found]
+    paired = [_questions(pairs, are_placebos=False) for pairs in trajectories]
     chosen = _without_excess(_in_rounds(paired, per_trajectory))
-    placebos = [[one for one in candidates if one.question.is_placebo] for candidates in found]
+    placebos = [_questions(pairs, are_placebos=True) for pairs in trajectories]
     n_placebos = len(chosen) // _PAIRS_A_PLACEBO
     return [*chosen, *_in_rounds(placebos, per_trajectory)[:n_placebos]]
+
+
+def _questions(pairs: Iterable[TwinPair], *, are_placebos: bool) -> list[_ChosenQuestion]:
+    """Return the questions of some pairs of worlds, placebos or the others."""
+    found = chain.from_iterable(map(_ChosenQuestion.of_pair, pairs))
+    return [one for one in found if one.question.is_placebo == are_placebos]
 
 
 def _in_rounds(

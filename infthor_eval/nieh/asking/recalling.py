@@ -173,7 +173,8 @@ class Recaller:
         self, question: Question, settings: RecallSettings, steps: Sequence[Observation]
     ) -> _Built:
         """Return the memory with the steps before the last one observed."""
-        built, self._built = self._built, None  # a memory that fails half-way is not used again
+        built = self._built
+        self._built = None  # a memory that fails half-way is not used again
         if built is None or not built.is_before(steps, settings):
             built = _begin(question, settings, self._write)
         if built.steps is not steps:

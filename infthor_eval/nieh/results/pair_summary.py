@@ -5,7 +5,7 @@ of one fact, are within one cluster.
 """
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import msgspec
@@ -179,10 +179,11 @@ def _ladders(pairs: Pairs[Side]) -> list[Ladder]:
             evidence = twin.length - twin.age
             name = (record.cluster, twin.fact, record.payload.question, record.variant, evidence)
             scores.setdefault(name, {}).setdefault(twin.age, []).append(pairs.shares(pair))
-    return [
-        Ladder(str(name[0]), {age: PairShares.mean(same).net for age, same in by_age.items()})
-        for name, by_age in scores.items()
-    ]
+    return [Ladder(str(name[0]), _net_by_age(by_age)) for name, by_age in scores.items()]
+
+
+def _net_by_age(by_age: Mapping[int, Iterable[PairShares]]) -> dict[int, float]:
+    return {age: PairShares.mean(shares).net for age, shares in by_age.items()}
 
 
 def _pairs(pairs: Sequence[TwinRecords], metric: str) -> Pairs[Side]:

@@ -72,11 +72,11 @@ def retention_of(ladders: Sequence[Ladder], seed: int = 0) -> Retention | None:
     ages = sorted({age for ladder in ladders for age in ladder.net})
     sums = [_sums(ladders, *ages_) for ages_ in pairwise(ages)]
     reached = next((at for at, it in enumerate(sums) if not it.n), len(sums))
-    ages, sums = ages[: reached + 1], sums[:reached]
-    if not sums:
+    if not reached:
         return None
+    del ages[reached + 1 :], sums[reached:]
     clusters = sorted({ladder.cluster for ladder in ladders})
-    table = np.array([[it.by_cluster.get(name, (0.0, 0.0)) for it in sums] for name in clusters])
+    table = np.stack([it.table(clusters) for it in sums], axis=1)
     shares = _curve(table.sum(axis=0))
     draws = np.random.default_rng(seed).multinomial(
         len(clusters), [1 / len(clusters)] * len(clusters), size=_N_RESAMPLES
@@ -105,6 +105,10 @@ class _Sums:
     by_cluster: Mapping[str, tuple[float, float]]
     n: int
 
+    def table(self, clusters: Sequence[str]) -> np.ndarray:
+        """Return the sums of these clusters at both ages, [clusters, 2]."""
+        return np.array([self.by_cluster.get(name, (0.0, 0.0)) for name in clusters])
+
 
 def _sums(ladders: Sequence[Ladder], age: int, following: int) -> _Sums:
     both = [it for it in ladders if age in it.net and following in it.net]
@@ -120,7 +124,8 @@ def _curve(totals: np.ndarray) -> np.ndarray:
 
     Where nothing was known at the first of both, nothing can be kept.
     """
-    first, second = totals[..., 0], totals[..., 1]
+    first = totals[..., 0]
+    second = totals[..., 1]
     ratios = np.where(first > 0, np.maximum(second, 0) / np.where(first > 0, first, 1), 0.0)
     left = np.cumprod(ratios, axis=-1)
     return np.concatenate([np.ones_like(left[..., :1]), left], axis=-1)
@@ -141,7 +146,8 @@ def _half_lives(ages: Sequence[int], curves: np.ndarray) -> np.ndarray:
     is_past = curves <= _HALF
     after = np.maximum(is_past.argmax(axis=1), 1)
     rows = np.arange(len(curves))
-    start, end = curves[rows, after - 1], curves[rows, after]
+    start = curves[rows, after - 1]
+    end = curves[rows, after]
     drop = np.where(is_past.any(axis=1), start - end, 1.0)
     times = np.log(ages)
     passed = times[after - 1] + (start - _HALF) / drop * (times[after] - times[after - 1])

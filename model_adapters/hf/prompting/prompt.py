@@ -79,10 +79,7 @@ def n_common(prompts: Sequence[Sequence[Piece]]) -> int:
 def n_nested(prompts: Sequence[Sequence[Piece]]) -> list[int]:
     """Return how many pieces of each prompt begin the one with the most frames, where those are all
     of its frames; nothing where one has others."""
-    ends = [
-        max((at for at, piece in enumerate(prompt, 1) if not isinstance(piece, int)), default=0)
-        for prompt in prompts
-    ]
+    ends = list(map(_end_of_frames, prompts))
     longest = max(ends)
     whole = [prompt for prompt, end in zip(prompts, ends, strict=True) if end == longest]
     common = n_common(whole)
@@ -91,6 +88,12 @@ def n_nested(prompts: Sequence[Sequence[Piece]]) -> list[int]:
         for prompt, end in zip(prompts, ends, strict=True)
     ]
     return shared if all(n >= end for n, end in zip(shared, ends, strict=True)) else []
+
+
+def _end_of_frames(prompt: Sequence[Piece]) -> int:
+    """Return how many pieces a prompt has up to its last frame."""
+    ends = (at for at, piece in enumerate(prompt, 1) if not isinstance(piece, int))
+    return max(ends, default=0)
 
 
 def token_ids(pieces: Iterable[Piece]) -> Iterator[int]:
