@@ -76,6 +76,7 @@ def main() -> None:
     shared: dict[str, str] = {}
     with tempfile.TemporaryDirectory() as folder:
         sets = write_sets(Path(folder))
+        ask(options.model, sets["end"], Path(folder) / "first")  # loads what all rounds use
         for number in range(options.rounds):
             for name, data in sets.items():
                 taken, replies = ask(options.model, data, Path(folder) / f"{name}-{number}")

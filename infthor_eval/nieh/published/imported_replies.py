@@ -127,11 +127,13 @@ class _Known:
     blind: Mapping[str, BlindGuess]
     n_frames: Mapping[str, int]
 
-    def length(self, traj_id: str) -> int | None:
-        """Return a trajectory's number of frames; None if neither a log nor the set tells."""
+    def length(self, question: Question) -> int | None:
+        """Return the number of frames up to a question's moment; None if neither a log nor the set
+        tells."""
+        traj_id = question.traj_id
         if traj_id in self.n_frames or not self.data.has_frames:
             return self.n_frames.get(traj_id)
-        return len(self.data.frames(traj_id))
+        return len(self.data.frames_until(question))
 
 
 def import_logs(
@@ -390,7 +392,7 @@ def _shown_clues(question: Question, reply: LoggedReply, known: _Known) -> Shown
     is_whole = reply.published is not None and reply.mode in _WHOLE
     if question.absence or (reply.frames is None and not is_whole):
         return None
-    n_frames = known.length(question.traj_id)
+    n_frames = known.length(question)
     n_shown = len(clues if reply.frames is None else clues.intersection(reply.frames))
     # A log of a model that takes only some frames counts these alone, and a clue can lie beyond.
     n_after = None if n_frames is None or n_frames <= max(clues) else n_frames - 1 - max(clues)
