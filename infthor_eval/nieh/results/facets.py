@@ -7,7 +7,14 @@ page, in the table of samples, and in exports.
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
-from infthor_eval.distances import DISTANCES, LENGTHS, distance_class, length_class
+from infthor_eval.distances import (
+    AGES,
+    DISTANCES,
+    LENGTHS,
+    age_class,
+    distance_class,
+    length_class,
+)
 from infthor_eval.facets import Facet
 from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.runs import UnitRecord
@@ -65,6 +72,12 @@ def _share_shown(record: Record) -> str | None:
 def _distance(record: Record) -> str | None:
     clues = record.payload.shown_clues
     return None if clues is None or clues.n_after is None else distance_class(clues.n_after)
+
+
+def _age(record: Record) -> str | None:
+    twin = record.payload.twin
+    is_placebo = twin is not None and twin.answers == record.payload.answers
+    return None if twin is None or twin.age is None or is_placebo else age_class(twin.age)
 
 
 def _length(record: Record) -> str | None:
@@ -127,6 +140,10 @@ FACETS = (
         has_column=True,
         of_files=True,
         is_worth=lambda context, classes: bool(classes) and context != "clues",
+    ),
+    # Beside the net pairs of twins.
+    QuestionFacet(
+        "age", "frames since the newest evidence", _age, AGES, has_column=True, in_charts=False
     ),
     QuestionFacet("words", "words of the question", _words, N_WORDS),
 )
