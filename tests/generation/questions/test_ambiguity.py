@@ -350,9 +350,9 @@ def test_a_view_well_inside_the_frame_is_preferred():
 
 
 def test_a_fork_must_fill_more_of_a_frame_than_a_knife_to_count_as_shown():
-    log = history({key: state(key, "Desk|1") for key in ("Desk|1", "Fork|1", "Knife|1")})
     both = {"Fork|1", "Knife|1"}
     for pixels, shown in ((89, set()), (90, {"Knife|1"}), (179, {"Knife|1"}), (180, both)):
+        log = history({key: state(key, "Desk|1") for key in ("Desk|1", "Fork|1", "Knife|1")})
         for key in both:
             log.steps[0].seen[key] = ObjectInFrame(pixels, (100, 100, 120, 120), True)
         (facts,) = facts_shown(log.steps, frame_facts(log.steps), DEFAULT_SHARE)
