@@ -44,8 +44,7 @@ class Episode:
     def until(self, n_high: int) -> "Episode":
         """Return the episode up to the end of so many sub-goals."""
         trajectory = first_subgoals(self.trajectory, n_high)
-        steps = self.history.steps[: len(trajectory.plan.low_actions) + 1]
-        history = TrajectoryHistory(trajectory.traj_id, steps)
+        history = self.history.until(len(trajectory.plan.low_actions))
         return Episode(trajectory, self.start, history, is_whole=False)
 
     @cached_property
@@ -114,7 +113,7 @@ def read_episode(trajectory: Trajectory, simulator: Simulator) -> Episode:
     with ScratchFolder() as scratch:
         folder = Path(scratch) / "replay"
         folder.mkdir()
-        report = replay(trajectory, simulator, folder, "", needs_all=True)
+        report = replay(trajectory, simulator, folder, "")
         if report.refusals:
             first = report.refusals[0]
             raise DataError(f"step {first.step}: {first.action}: {first.error}; {_HINT}")

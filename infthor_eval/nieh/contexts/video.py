@@ -37,9 +37,9 @@ def video(
 def _positions_in_film(data: NiehSet, question: Question, fps: float) -> tuple[int, ...]:
     """Return which of the frames sampled from a trajectory's mp4 are up to a question's moment."""
     n_sampled = len(data.sampled_video(question.traj_id, fps).frames)
-    places = sample_positions(len(data.frames(question.traj_id)), FILM_FPS, fps)
     if question.moment is None:
         return tuple(range(n_sampled))
+    places = sample_positions(len(data.frames(question.traj_id)), FILM_FPS, fps)
     if len(places) != n_sampled:
         raise DataError(
             f"the film of {question.traj_id} shows {n_sampled} frames where its trajectory has "

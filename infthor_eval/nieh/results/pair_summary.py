@@ -6,6 +6,7 @@ of one fact, are within one cluster.
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import msgspec
@@ -294,19 +295,10 @@ def _clues(pair: TwinRecords) -> str:
     return N_CLUES[min(max(n_clues, 1), len(N_CLUES)) - 1]
 
 
-def _age(pair: TwinRecords) -> str | None:
-    age = pair[0].twin.age
-    return None if age is None else age_class(age)
-
-
-def _span(pair: TwinRecords) -> str | None:
-    span = pair[0].twin.span
-    return None if span is None else age_class(span)
-
-
-def _length(pair: TwinRecords) -> str | None:
-    length = pair[0].twin.length
-    return None if length is None else age_class(length)
+def _frames(name: str, pair: TwinRecords) -> str | None:
+    """Return the class of a number of frames, the same on both sides, by its name in `TwinSide`."""
+    n_frames = getattr(pair[0].twin, name)
+    return None if n_frames is None else age_class(n_frames)
 
 
 # Those by which a chart has curves of memory, in the tables' order.
@@ -320,7 +312,7 @@ _SHOWN = Facet("shown", "number of frames shown", _shown, N_SHOWN)
 _AGE = Facet(
     "age",
     "frames since the newest evidence",
-    _age,
+    partial(_frames, "age"),
     AGES,
 )
 MEMORY_FACETS = (_DISTANCE, _SHOWN, _AGE)
@@ -342,7 +334,7 @@ PAIR_FACETS: tuple[Facet[TwinRecords], ...] = (
         SHOWN_DIFFERENCE,
     ),
     _AGE,
-    Facet("span", "frames since the oldest clue", _span, AGES),
-    Facet("length", "frames up to the question", _length, AGES),
+    Facet("span", "frames since the oldest clue", partial(_frames, "span"), AGES),
+    Facet("length", "frames up to the question", partial(_frames, "length"), AGES),
     Facet("clues", "number of clue frames", _clues, N_CLUES),
 )

@@ -125,13 +125,17 @@ class TransformersModel(HfModel):
             begin_reply(self._loaded, decoding, token_ids(prompt), keep_margins=margins)
             for prompt in prompts
         ]
-        decode = self._decode_branches if self._n_shared(prompts) else self._decode_each
+        n_shared = self._n_shared(prompts)
         try:
             with (
                 wrap_model_errors(self.name),
                 wrap_memory_errors(self.name, sum(map(n_tokens, prompts))),
             ):
-                n_cached = decode(prompts, replies)
+                n_cached = (
+                    self._decode_branches(prompts, n_shared, replies)
+                    if n_shared
+                    else self._decode_each(prompts, replies)
+                )
         except ModelError:
             # After running out of memory, the next request needs all of it.
             self._prefix.reset()
@@ -171,10 +175,12 @@ class TransformersModel(HfModel):
         return cached
 
     def _decode_branches(
-        self, prompts: Sequence[Sequence[Piece]], replies: Sequence[ReplyState]
+        self,
+        prompts: Sequence[Sequence[Piece]],
+        n_shared: Sequence[int],
+        replies: Sequence[ReplyState],
     ) -> list[int]:
         """Decode replies together; return how many tokens of each prompt were in the cache."""
-        n_shared = self._n_shared(prompts)
         most = max(n_shared)
         longest = prompts[n_shared.index(most)]
         cached = min(self._prefix.rewind_to(longest), most)
