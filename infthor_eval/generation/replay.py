@@ -5,7 +5,7 @@ what really happened, so questions on it are still correct. The trajectory count
 its first refused action on.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -14,18 +14,19 @@ import msgspec
 
 from infthor_eval.errors import DataError
 from infthor_eval.formats.pictures.png import PngWriter
-from infthor_eval.formats.step_log import write_steps
+from infthor_eval.formats.step_log import Step, write_steps
 from infthor_eval.formats.trajectory import LowAction, Trajectory, TrajectorySource
 from infthor_eval.generation.motion import intermediate_views
 from infthor_eval.generation.simulator_jobs import JobProgress, OnProgress, ignore_progress
 from infthor_eval.household.sequence_text import sequence_text
 from infthor_eval.household.state_summary import state_summaries
 from infthor_eval.thor.actions import text_of
+from infthor_eval.thor.drawn_pictures import DrawnPictures
 from infthor_eval.thor.grounding import Grounding
 from infthor_eval.thor.recorded import MissingObjectError, translate
 from infthor_eval.thor.recorder import Recorder
 from infthor_eval.thor.restore import restore
-from infthor_eval.thor.simulator import Simulator
+from infthor_eval.thor.simulator import Simulator, SimulatorMark
 from infthor_eval.thor.view import SimulatorView
 
 
@@ -86,6 +87,8 @@ def replay(
     on_progress: OnProgress = ignore_progress,
     *,
     needs_all: bool = False,
+    drawn: DrawnPictures | None = None,
+    beginning: "Beginning | None" = None,
 ) -> ReplayReport:
     """Run a trajectory and write its frames and logs into a folder.
 
@@ -102,19 +105,33 @@ def replay(
         on_progress: called after each action.
         needs_all: True to end where the scene cannot be restored, and at the first refusal; no log
             is written then.
+        drawn: pictures of earlier replays, which are not drawn again.
+        beginning: what is not replayed again.
     """
     report = ReplayReport(trajectory.traj_id, digest, trajectory.scene.floor_plan, frames)
-    actions = ActionReplay(simulator, trajectory, report, on_progress)
+    further = (lambda: drawn.arguments) if drawn is not None else dict[str, Any]
+    start = None if beginning is None else beginning.start
+    actions = ActionReplay(simulator, trajectory, report, on_progress, further, start)
     if needs_all and report.restore:
         return report
     (folder / "img").mkdir()
     with PngWriter(folder / "img") as frame_files:
-        run = _Run(simulator, actions, frame_files, frames)
-        for index, low in enumerate(trajectory.plan.low_actions):
+        steps = () if beginning is None else beginning.steps
+        run = _Run(simulator, actions, Recorder(frame_files, drawn, steps), frames)
+        todo: Sequence[tuple[int, LowAction]] = list(enumerate(trajectory.plan.low_actions))
+        if beginning is None:
+            run.recorder.record(simulator.view)
+        else:
+            todo = run.go_on(beginning, todo, frame_files)
+        for index, low in todo:
             run.act(index, low)
             if needs_all and report.refusals:
                 return report
-    steps = run.recorder.steps
+    _write_logs(trajectory, run.recorder.steps, folder)
+    return report
+
+
+def _write_logs(trajectory: Trajectory, steps: list[Step], folder: Path) -> None:
     write_steps(folder, steps)
     (folder / "traj.txt").write_text(sequence_text(trajectory, steps) + "\n")
     images = [{"low_idx": step.step, "image_name": step.img_filename} for step in steps]
@@ -123,7 +140,25 @@ def replay(
     ends.add(len(trajectory.plan.low_actions) - 1)
     summaries = {str(index): text for index, text in state_summaries(steps, ends).items()}
     (folder / "state_summary.json").write_bytes(msgspec.json.encode(summaries) + b"\n")
-    return report
+
+
+@dataclass(frozen=True)
+class Beginning:
+    """What a replay has in common with an earlier one in the same simulator, with one frame a move.
+
+    Attributes:
+        start: the restored scene.
+        steps: entries of the frames in common, from the first one on.
+        images: folder of the files of these frames.
+        mark: a state at or before the last of these frames.
+        n_done: number of actions up to the mark.
+    """
+
+    start: SimulatorView
+    steps: Sequence[Step]
+    images: Path
+    mark: SimulatorMark
+    n_done: int
 
 
 @dataclass(frozen=True)
@@ -176,7 +211,8 @@ def _area(box: tuple[int, int, int, int]) -> int:
 class ActionReplay:
     """Executes the actions of a trajectory in a simulator, from its restored scene on.
 
-    What is accepted, refused or not restored is added to the report.
+    What is accepted, refused or not restored is added to the report; `further` returns arguments
+    that each action has besides its own. With a `start` that was restored before, nothing is.
     """
 
     def __init__(
@@ -185,13 +221,17 @@ class ActionReplay:
         trajectory: Trajectory,
         report: ReplayReport,
         on_progress: OnProgress = ignore_progress,
+        further: Callable[[], dict[str, Any]] = dict[str, Any],
+        start: SimulatorView | None = None,
     ) -> None:
-        report.restore = restore(simulator, trajectory.scene).lines()
+        if start is None:
+            report.restore = restore(simulator, trajectory.scene).lines()
         self._simulator = simulator
         self._report = report
         self._on_progress = on_progress
+        self._further = further
         self._n_actions = len(trajectory.plan.low_actions)
-        self._grounding = Grounding(simulator.view)
+        self._grounding = Grounding(start or simulator.view)
 
     def execute(self, index: int, low: LowAction) -> tuple[str | None, str | None]:
         """Execute the action of an index.
@@ -223,7 +263,7 @@ class ActionReplay:
             return None, str(missing)
         target = call.get("objectId")
         self._compare_box(index, low, target, before)
-        after = self._simulator.step(**call)
+        after = self._simulator.step(**call, **self._further())
         return target, None if after.success else after.error or "refused without a message"
 
     def _compare_box(
@@ -245,13 +285,24 @@ class _Run:
     """The recording of one replay."""
 
     def __init__(
-        self, simulator: Simulator, actions: ActionReplay, images: PngWriter, frames: int
+        self, simulator: Simulator, actions: ActionReplay, recorder: Recorder, frames: int
     ) -> None:
         self._simulator = simulator
         self._actions = actions
         self._frames = frames
-        self.recorder = Recorder(images)
-        self.recorder.record(simulator.view)
+        self.recorder = recorder
+
+    def go_on(
+        self, beginning: Beginning, actions: Sequence[tuple[int, LowAction]], images: PngWriter
+    ) -> Sequence[tuple[int, LowAction]]:
+        """Take over a beginning and its frames; return the actions after it."""
+        for step in beginning.steps:
+            images.link(beginning.images / step.img_filename, images.folder / step.img_filename)
+        n_common = len(beginning.steps) - 1
+        self._simulator.rewind(beginning.mark, exactly=True)
+        for index, low in actions[beginning.n_done : n_common]:
+            self._actions.execute(index, low)
+        return actions[n_common:]
 
     def act(self, index: int, low: LowAction) -> None:
         before = self._simulator.view

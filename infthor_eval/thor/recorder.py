@@ -1,9 +1,20 @@
 """Recording the frames and the step log of an episode."""
 
+from collections import deque
+from collections.abc import Sequence
+
 from infthor_eval.errors import SimulatorError
 from infthor_eval.formats.object_ids import object_type_of
 from infthor_eval.formats.pictures.png import PngWriter
-from infthor_eval.formats.step_log import LoggedPose, ObjectInFrame, ObjectLog, ObjectState, Step
+from infthor_eval.formats.step_log import (
+    LoggedPose,
+    ObjectInFrame,
+    ObjectLog,
+    ObjectState,
+    Step,
+    iter_object_states,
+)
+from infthor_eval.thor.drawn_pictures import DrawnPictures
 from infthor_eval.thor.outline import shares_in_frame
 from infthor_eval.thor.segmentation import Instance
 from infthor_eval.thor.view import SimulatorView, ThorObject
@@ -12,11 +23,24 @@ from infthor_eval.thor.view import SimulatorView, ThorObject
 class Recorder:
     """Turns simulator states into log entries (`steps`, one a frame), and images into a folder."""
 
-    def __init__(self, images: PngWriter | None = None) -> None:
-        """Start without a frame; `images` writes the frames, None for no files."""
+    def __init__(
+        self,
+        images: PngWriter | None = None,
+        drawn: DrawnPictures | None = None,
+        beginning: Sequence[Step] = (),
+    ) -> None:
+        """Start after a beginning whose frames are written, or without a frame.
+
+        Args:
+            images: writes the frames; None for no files.
+            drawn: pictures of earlier recordings, which are not drawn again.
+            beginning: entries that an earlier recording has in common with this one.
+        """
         self._images = images
-        self._states: dict[str, ObjectState] = {}
-        self.steps: list[Step] = []
+        self._drawn = drawn
+        states = deque(iter_object_states(beginning), maxlen=1)
+        self._states = {key: it for last in states for key, it in last.items() if it.exists}
+        self.steps = list(beginning)
 
     def record(
         self,
@@ -54,13 +78,17 @@ class Recorder:
             changes=self._changes(view),
         )
         if self._images is not None:
-            if view.frame is None:
-                raise SimulatorError(
-                    f"{entry.img_filename}: the simulator sent no frame; start it with rendering on"
-                )
-            self._images.write(entry.img_filename, view.frame)
+            self._write(self._images, entry.img_filename, view)
         self.steps.append(entry)
         return entry
+
+    def _write(self, images: PngWriter, name: str, view: SimulatorView) -> None:
+        if self._drawn is not None and view.image_digest is not None:
+            self._drawn.write(images, name, view, view.image_digest)
+        elif view.frame is not None:
+            images.write(name, view.frame)
+        else:
+            raise SimulatorError(f"{name}: the simulator sent no frame; start it with rendering on")
 
     def _changes(self, view: SimulatorView) -> dict[str, ObjectState]:
         states = {key: state_of(obj) for key, obj in view.objects.items()}

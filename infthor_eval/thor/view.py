@@ -193,6 +193,8 @@ class SimulatorView:
         segmentation: which object each pixel shows; None likewise.
         arm: arm of the agent; None if it has none.
         camera: the agent's; None where a simulator does not report it.
+        image_digest: what the frame shows, whether it is rendered or not; None where it was not
+            asked for.
     """
 
     frame: NDArray[np.uint8] | None
@@ -209,6 +211,7 @@ class SimulatorView:
     segmentation: Segmentation | None = None
     arm: ArmState | None = None
     camera: Camera | None = None
+    image_digest: str | None = None
 
 
 class _InHand(msgspec.Struct):
@@ -264,6 +267,7 @@ def view_of(event: Any) -> SimulatorView:
         segmentation=segmentation,
         arm=arm,
         camera=camera,
+        image_digest=metadata.get("imageDigest"),
     )
 
 

@@ -21,7 +21,8 @@ from infthor_sim.simulation import Simulation
 _MESSAGE_KEYS = frozenset(
     "action sequenceId agentId renderImage renderDepthImage renderClassImage renderObjectImage "
     "renderNormalsImage renderFlowImage renderSemanticSegmentation renderInstanceSegmentation "
-    "visibilityDistance fixedDeltaTime actionSimulationSeconds physicsSimulationParams".split()
+    "visibilityDistance fixedDeltaTime actionSimulationSeconds physicsSimulationParams "
+    "imageDigest".split()  # the last one is ours
 )
 _LARGEST = 1e9  # of a number; squares of larger ones would overflow in the geometry
 

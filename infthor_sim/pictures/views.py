@@ -20,6 +20,7 @@ from infthor_sim.render.picture import (
     cast_picture,
     colour_picture,
     compiled_rasterizer,
+    digest_of_colours,
 )
 from infthor_sim.render.primitives import CENTER, COLUMNS, HALF, INSTANCE, rows
 from infthor_sim.render.shapes import shape
@@ -156,6 +157,12 @@ class Views:
             rgb = colour_picture(picture, lights, self._display.rasterizer, antialias)
             self._coloured = kept = _Coloured(picture, lights, antialias, rgb)
         return kept.rgb
+
+    def digest_of_colours(self, picture: Picture) -> str:
+        """Return a digest that pictures of the same colours share, without drawing them."""
+        display = self._display
+        lights = self._model.lights()
+        return digest_of_colours(picture, lights, display.rasterizer, display.antialias)
 
 
 @dataclass(frozen=True)

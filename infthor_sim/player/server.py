@@ -135,7 +135,13 @@ class SimulatorServer:
             "classes": message.get("renderSemanticSegmentation", sim.settings.classes),
         }
         segmented = bool(requested["ids"] or requested["classes"])
-        yield FieldType.METADATA, self._packer.message(sim, outcomes, sequence, segmented)
+        further = {}
+        if message.get("imageDigest"):
+            further["imageDigest"] = sim.views.digest_of_colours(sim.views.agent_frame())
+        yield (
+            FieldType.METADATA,
+            self._packer.message(sim, outcomes, sequence, segmented, further),
+        )
         if not any(requested.values()):
             return
         for _ in sim.each_agent():
@@ -173,12 +179,20 @@ class MetadataPacker:
         self._scene = -1  # the number of the scene whose objects are packed
 
     def message(
-        self, sim: Simulation, outcomes: Sequence[Outcome], sequence: int, with_colors: bool
+        self,
+        sim: Simulation,
+        outcomes: Sequence[Outcome],
+        sequence: int,
+        with_colors: bool,
+        further: Mapping[str, Any],
     ) -> bytes:
-        """Return the METADATA body of one reply, with the outcome of each agent's last action."""
+        """Return the METADATA body of one reply, with the outcome of each agent's last action.
+
+        `further` is what only this simulator tells, of the active agent's frame.
+        """
         parts = [_map_head(4), msgpack.packb("agents"), _array_head(len(outcomes))]
         for number in sim.each_agent():
-            agent = agent_metadata(sim, outcomes[number])
+            agent = {**agent_metadata(sim, outcomes[number]), **further}
             parts += [_map_head(len(agent) + 2), _entries(agent)]
             parts += [msgpack.packb("objects"), *self._objects(sim)]
             parts += [msgpack.packb("colors"), self._color_list(sim) if with_colors else b"\xc0"]

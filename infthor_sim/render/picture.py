@@ -160,6 +160,26 @@ def colour_picture(
     return rgb
 
 
+def digest_of_colours(
+    picture: Picture, lights: Lights, rasterizer: Rasterizer, antialias: bool = True
+) -> str:
+    """Return a digest of all that `colour_picture` depends on; pictures that share it are equal.
+
+    That is the primitives that pixels show, which of them each pixel shows, the camera, the light;
+    neither objects' names nor what is hidden.
+    """
+    shown = rasterizer.count(picture.nearest, len(picture.projection.index)) > 0
+    numbers = np.append(np.cumsum(shown), 0).astype(np.uint16)  # the void, -1, takes the last: 0
+    prims = np.delete(picture.prims[picture.projection.index[shown]], INSTANCE, axis=1)
+    camera = picture.camera
+    content = hashlib.blake2b(digest_size=16)
+    for part in (prims, camera.position, camera.matrix, lights.lamps, numbers[picture.nearest]):
+        content.update(np.ascontiguousarray(part).data)
+    rest = camera.field_of_view, camera.near, camera.far, lights.daylight, antialias
+    content.update(repr((rest, picture.nearest.shape, prims.shape)).encode())
+    return content.hexdigest()
+
+
 def drop_stale_kernels(folder: Path = _HERE) -> bool:
     """Remove kernels compiled from other sources than those in `folder`; return if any were.
 

@@ -11,7 +11,12 @@ from infthor_sim.player.fifo import FieldType
 from infthor_sim.render.camera import PinholeCamera
 from infthor_sim.render.hand import HAND
 from infthor_sim.render.lighting import Lights
-from infthor_sim.render.picture import cast_picture, colour_picture, compiled_rasterizer
+from infthor_sim.render.picture import (
+    cast_picture,
+    colour_picture,
+    compiled_rasterizer,
+    digest_of_colours,
+)
 from infthor_sim.render.primitives import Form, Material, ShapePart, rows
 from infthor_sim.render.shapes import shape
 
@@ -258,3 +263,51 @@ def test_kernels_are_recompiled_when_a_source_changes(tmp_path):
     (tmp_path / "patterns.py").write_text("a = 2", encoding="ascii")
     assert picture.drop_stale_kernels(tmp_path)
     assert not compiled.exists()
+
+
+def test_pictures_of_one_digest_are_equal_and_those_of_another_are_drawn_as_such():
+    """Of a walk with openings, with a held thing, and of the same walk once more after a change."""
+    bench = Bench.at("kitchen-3", renderInstanceSegmentation=True)
+    drawn: dict[str, bytes] = {}
+    digests = []
+    objects = bench.metadata["objects"]
+    fridge, egg = (
+        next(o["objectId"] for o in objects if o["objectType"] == name)
+        for name in ("Fridge", "Egg")
+    )
+    for change in ("Pass", "OpenObject"):
+        bench.force(change, fridge) if change != "Pass" else bench.ok("Pass")
+        walked = []
+        for _ in range(12):
+            for name in ("RotateRight", "LookDown", "LookUp"):
+                bench.step(name, imageDigest=True, renderImage=False)
+                assert FieldType.RGB not in bench.frames
+                digest = bench.metadata["imageDigest"]
+                bench.step("Pass", imageDigest=True)
+                assert bench.metadata["imageDigest"] == digest
+                frame = bench.frames[FieldType.RGB]
+                assert drawn.setdefault(digest, frame) == frame
+                walked.append(digest)
+        digests.append(walked)
+        assert len(set(walked)) > 4
+    assert set(digests[0]) != set(digests[1])
+    assert set(digests[0]) & set(digests[1])  # where the fridge is not in view
+    assert len(set(drawn.values())) == len(drawn)
+    before = bench.metadata["imageDigest"]
+    bench.force("PickupObject", egg)
+    bench.step("Pass", imageDigest=True)
+    assert bench.metadata["imageDigest"] != before
+    assert drawn.get(bench.metadata["imageDigest"]) is None
+    bench.ok("Pass")
+    assert "imageDigest" not in bench.metadata
+
+
+def test_the_light_is_part_of_a_digest():
+    picture = cast_picture(one(Form.BOX, 3.0), ("a",), camera(), COMPILED)
+    renamed = cast_picture(one(Form.BOX, 3.0), ("b",), camera(), COMPILED)
+    lights = [Lights(np.zeros((0, 4)), 1.0), Lights(np.array([[0.0, 2.0, 1.0, 0.5]]), 1.0)]
+    dark = Lights(np.zeros((0, 4)), 0.5)
+    digests = [digest_of_colours(picture, light, COMPILED) for light in (*lights, dark)]
+    assert len(set(digests)) == 3
+    assert digest_of_colours(renamed, lights[0], COMPILED) == digests[0]
+    assert digest_of_colours(picture, lights[0], COMPILED, antialias=False) not in digests

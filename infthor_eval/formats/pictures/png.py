@@ -4,13 +4,15 @@ Pillow filters each row before it compresses it: that suits photographs. Rendere
 even areas, come out smaller without a filter, and in a third of the time.
 """
 
+import os
 import struct
 import zlib
 from collections import deque
+from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,7 +47,7 @@ class PngWriter:
     """
 
     def __init__(self, folder: Path) -> None:
-        self._folder = folder
+        self.folder = folder
         self._thread = ThreadPoolExecutor(1, "png")
         self._waiting: deque[Future[None]] = deque()
 
@@ -61,7 +63,14 @@ class PngWriter:
 
     def write(self, name: str, frame: NDArray[np.uint8]) -> None:
         """Write an RGB frame [height, width, 3], which must not change any more."""
-        self._waiting.append(self._thread.submit(write_png, self._folder / name, frame, _LEVEL))
+        self._submit(write_png, self.folder / name, frame, _LEVEL)
+
+    def link(self, source: Path, target: Path) -> None:
+        """Give a file that this writer or an earlier one wrote a second name."""
+        self._submit(os.link, source, target)
+
+    def _submit(self, function: Callable[..., None], *arguments: Any) -> None:
+        self._waiting.append(self._thread.submit(function, *arguments))
         if len(self._waiting) > _WAITING:
             self._waiting.popleft().result()
 

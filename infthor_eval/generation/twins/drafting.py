@@ -6,9 +6,8 @@ An eye must see in the pictures what differs: objects, actions, the answer to a 
 
 import random
 import shutil
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 
@@ -17,12 +16,11 @@ from msgspec.structs import replace
 
 from infthor_eval.formats.object_ids import object_type_of
 from infthor_eval.formats.shared_frames import store_picture, write_frame_names
-from infthor_eval.formats.step_log import ObjectInFrame, Step, read_steps
+from infthor_eval.formats.step_log import ObjectInFrame, Step
 from infthor_eval.formats.trajectory import Trajectory, encode_trajectory
 from infthor_eval.formats.twins import ComparedFrame, PairedQuestion, TwinPair
-from infthor_eval.generation.replay import replay
 from infthor_eval.generation.twins.comparison import Difference, World, compare
-from infthor_eval.generation.twins.episode import Episode, read_episode
+from infthor_eval.generation.twins.episode import Episode
 from infthor_eval.generation.twins.kinds import KINDS, EditKind, EditRefused, Proposal, Worlds
 from infthor_eval.generation.twins.pairing import (
     AskedWorld,
@@ -31,16 +29,20 @@ from infthor_eval.generation.twins.pairing import (
     types_of_fact,
 )
 from infthor_eval.generation.twins.pictures import are_clearly_unlike
+from infthor_eval.generation.twins.replays import WORLD, Replayed, Replays
 from infthor_eval.generation.twins.rewriting import without_traces
-from infthor_eval.generation.twins.rungs import ladders, stretches, that_stay
+from infthor_eval.generation.twins.rungs import (
+    farthest_first,
+    ladders,
+    stretches,
+    that_stay,
+)
 from infthor_eval.generation.twins.tolerance import tolerance_of
 from infthor_eval.household.wording import canonical_type
-from infthor_eval.storage.digests import digest, digest_of_file
+from infthor_eval.storage.digests import digest
 from infthor_eval.storage.files import file_name, write_atomically
-from infthor_eval.storage.scratch import ScratchFolder
 from infthor_eval.thor.simulator import Simulator
 
-_WORLD = "twin"  # what a world is called while it is replayed
 _COPIED = ("metadata.json", "traj.txt", "state_summary.json")
 
 
@@ -101,57 +103,15 @@ def draft_twins(
         out: folder of the set.
     """
     draft = TwinDraft(base, settings, trajectory.scene.floor_plan)
-    episode = read_episode(trajectory, simulator)
     with ExitStack() as stack:
         replays = Replays(simulator, stack)
-        for stretch in stretches(episode) if settings.rungs else (episode,):
-            maker = _Maker(draft, stretch, score, replays, out)
-            for name in settings.kinds:
+        episode = replays.read(trajectory)
+        parts = stretches(episode) if settings.rungs else (episode,)
+        makers = [_Maker(draft, part, score, replays, out) for part in parts]
+        for name in settings.kinds:
+            for maker in makers:
                 maker.try_kind(name)
     return draft
-
-
-@dataclass(frozen=True)
-class Replayed:
-    """A replayed world and the folder of its files."""
-
-    world: World
-    folder: Path
-
-
-class Replays:
-    """Replays worlds, each once, whatever edits it is of."""
-
-    def __init__(self, simulator: Simulator, stack: ExitStack) -> None:
-        self.simulator = simulator
-        self._stack = stack
-        self._replayed: dict[str, Replayed | str] = {}
-
-    def replayed(self, world: Trajectory) -> Replayed:
-        """Return the replay of a world.
-
-        Raises:
-            Difference: it cannot be restored, or an action is refused.
-        """
-        key = digest(msgspec.json.encode(world))
-        if key not in self._replayed:
-            self._replayed[key] = self._replay(world)
-        result = self._replayed[key]
-        if isinstance(result, str):
-            raise Difference(result)
-        return result
-
-    def _replay(self, world: Trajectory) -> Replayed | str:
-        folder = self._stack.enter_context(ScratchFolder()) / _WORLD
-        folder.mkdir()
-        report = replay(world, self.simulator, folder, "", needs_all=True)
-        if report.restore:
-            return "its start cannot be restored"
-        if report.refusals:
-            return f"{report.refusals[0].action.partition(' ')[0]} is refused"
-        steps = read_steps(folder)
-        files = [folder / "img" / step.img_filename for step in steps]
-        return Replayed(World(steps, [digest_of_file(file) for file in files], files), folder)
 
 
 class _Maker:
@@ -177,7 +137,10 @@ class _Maker:
         rejected = self._draft.rejected.setdefault(name, {})
         pairs: list[TwinPair] = []
         n_proposed = 0
-        for proposal in kind.propose(self._episode, rng):
+        proposals: Iterable[Proposal] = kind.propose(self._episode, rng)
+        if settings.rungs:
+            proposals = farthest_first(proposals, self._episode, settings.rungs)
+        for proposal in proposals:
             if n_proposed == 2 * settings.per_kind or len(pairs) == settings.per_kind:
                 break
             pair_id = f"{name}-{digest(f'{stream}/{n_proposed}', 4)}"
@@ -204,7 +167,7 @@ class _Maker:
         worlds = proposal.apply(self._episode, self._replays.simulator)
         if is_flipped(pair_id):
             worlds = worlds.flipped()
-        replays = [self._replays.replayed(without_traces(one, _WORLD)) for one in worlds.pair]
+        replays = [self._replays.replayed(without_traces(one, WORLD)) for one in worlds.pair]
         tolerance = tolerance_of(self._replays.simulator)
         first, second = (replayed.world for replayed in replays)
         frames, displaced = compare(worlds, first, second, tolerance)
@@ -253,8 +216,14 @@ class _Maker:
             found = pair_questions(until, worlds.types, self._score, differing)
             return [replace(question, moment=moment) for question in found]
 
-        of_ladders = (that_stay(list(map(ask_at, ladder))) for ladder in ladders(frames, rungs))
-        return list(chain.from_iterable(of_ladders))
+        asked_of: dict[str, list[PairedQuestion]] = {}
+        for ladder in ladders(frames, rungs):
+            climbed: dict[str, list[PairedQuestion]] = {}
+            for question in that_stay(list(map(ask_at, ladder))):
+                climbed.setdefault(f"{question.text} {question.answers}", []).append(question)
+            # With the same answers it would be asked once more on younger evidence.
+            asked_of = {**climbed, **asked_of}
+        return list(chain.from_iterable(asked_of.values()))
 
     def _write(self, worlds: Worlds, pair: TwinPair, replays: Sequence[Replayed]) -> None:
         first, second = (replayed.world.files for replayed in replays)

@@ -1,23 +1,14 @@
 """An episode that twins are made of: a trajectory, its restored start, and what happened in it."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 
-from infthor_eval.errors import DataError
-from infthor_eval.formats.step_log import read_steps
-from infthor_eval.formats.trajectory import ApiAction, Trajectory
+from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.generation.questions import open_state
 from infthor_eval.generation.questions.history import ObjectMove, TrajectoryHistory
-from infthor_eval.generation.replay import replay
 from infthor_eval.generation.twins.rewriting import first_subgoals, whole_of
 from infthor_eval.household.containment import logged_parent
 from infthor_eval.household.wording import canonical_type
-from infthor_eval.storage.scratch import ScratchFolder
-from infthor_eval.thor.grounding import Grounding
-from infthor_eval.thor.restore import restore
-from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import SimulatorView, ThorObject
 
 # What people would ask about as open or closed, and what can stand open without a hand on it.
@@ -97,43 +88,6 @@ class Episode:
         events = self.history.events
         heads = {whole_of(event.target) for event in events}
         return sum(canonical_type(head.partition("|")[0]) == name for head in heads)
-
-
-def read_episode(trajectory: Trajectory, simulator: Simulator) -> Episode:
-    """Restore and replay a trajectory."""
-    restored = restore(simulator, trajectory.scene)
-    if restored.dropped or restored.refused:
-        reason = [*restored.dropped, *restored.refused][0]
-        raise DataError(f"its start cannot be restored ({reason}); {_HINT}")
-    start = simulator.view
-    grounding = Grounding(start)
-    for api in _api_actions(trajectory):
-        for name in ("object_id", "receptacle_id"):
-            _ground(api, name, grounding, start)
-    with ScratchFolder() as scratch:
-        folder = Path(scratch) / "replay"
-        folder.mkdir()
-        report = replay(trajectory, simulator, folder, "")
-        if report.refusals:
-            first = report.refusals[0]
-            raise DataError(f"step {first.step}: {first.action}: {first.error}; {_HINT}")
-        steps = read_steps(folder)
-    return Episode(trajectory, start, TrajectoryHistory(trajectory.traj_id, steps))
-
-
-def _api_actions(trajectory: Trajectory) -> Iterator[ApiAction]:
-    for low in trajectory.plan.low_actions:
-        yield low.api_action
-
-
-def _ground(api: ApiAction, name: str, grounding: Grounding, start: SimulatorView) -> None:
-    """Replace a recorded id of an object that is there at the start by the simulator's."""
-    recorded = getattr(api, name)
-    if recorded is None or recorded.count("|") > 3:  # a part or a slice keeps its whole's id
-        return
-    key = grounding.ground(recorded, start)
-    if key is not None:
-        setattr(api, name, key)
 
 
 def _is_of(target: str, key: str) -> bool:

@@ -33,6 +33,12 @@ class Exchange:
     """
 
     pairs: tuple[_Pair | None, _Pair]
+    index: ClassVar[int] = 0
+
+    @property
+    def keys(self) -> frozenset[str]:
+        """See `Proposal`."""
+        return frozenset(obj.object_id for obj in self.objects)
 
     @property
     def objects(self) -> tuple[ThorObject, ...]:

@@ -25,15 +25,15 @@ from infthor_eval.generation.rollout import Rollout
 from infthor_eval.generation.trace import ExecutedAction, RolloutError, Trace
 from infthor_eval.generation.twins.comparison import Difference, compare
 from infthor_eval.generation.twins.drafting import (
-    Replays,
     TwinSettings,
     is_flipped,
     name_worlds,
 )
-from infthor_eval.generation.twins.episode import Episode, read_episode
+from infthor_eval.generation.twins.episode import Episode
 from infthor_eval.generation.twins.exchanges import Exchange
 from infthor_eval.generation.twins.final_places import Errand, are_apart, errands, place_in
 from infthor_eval.generation.twins.kinds import KINDS, EditKind, EditRefused, Proposal, Worlds
+from infthor_eval.generation.twins.replays import Replays
 from infthor_eval.generation.twins.rewriting import first_subgoals, without_traces
 from infthor_eval.generation.walking import Walker
 from infthor_eval.household.first_place import FirstPlace, first_place, is_looked_at
@@ -93,9 +93,9 @@ def draft_final_tasks(
     if not trajectory.sub_trajs:
         raise DataError("it has no tasks for a final one to follow; give a long trajectory")
     draft = FinalTaskDraft(base, settings, trajectory.scene.floor_plan)
-    episode = read_episode(trajectory, simulator)
     with ExitStack() as stack:
-        maker = _Maker(draft, episode, Replays(simulator, stack), out)
+        replays = Replays(simulator, stack)
+        maker = _Maker(draft, replays.read(trajectory), replays, out)
         for name in settings.kinds:
             maker.try_kind(name)
     return draft

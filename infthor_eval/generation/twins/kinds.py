@@ -19,16 +19,18 @@ KINDS = PluginTable(
     "kind of twins",
     "infthor_eval.twins",
     {
+        # These go on from states of the episode that are stored until a start is restored.
+        "count-open": f"{_HERE}.openings:CountOpen",
+        "count-move": f"{_HERE}.carrying:CountMove",
+        "count-put": f"{_HERE}.carrying:CountPut",
+        "put-target": f"{_HERE}.carrying:PutTarget",
+        # These restore another start.
         "swap": f"{_HERE}.exchanges:Swap",
         "swap-task": f"{_HERE}.exchanges:SwapTask",
         "swap-sliced": f"{_HERE}.exchanges:SwapSliced",
         "move": f"{_HERE}.exchanges:Move",
         "replace": f"{_HERE}.start_states:Replace",
         "state": f"{_HERE}.start_states:Opened",
-        "count-open": f"{_HERE}.openings:CountOpen",
-        "count-move": f"{_HERE}.carrying:CountMove",
-        "count-put": f"{_HERE}.carrying:CountPut",
-        "put-target": f"{_HERE}.carrying:PutTarget",
     },
     "docs/twins.md",
 )
@@ -72,6 +74,14 @@ class Worlds:
 
 class Proposal(Protocol):
     """An edit of an episode that may be possible."""
+
+    @property
+    def keys(self) -> frozenset[str]:
+        """Ids in the episode of the objects that may differ."""
+
+    @property
+    def index(self) -> int:
+        """Frame from which on they may; 0 for the start."""
 
     def apply(self, episode: Episode, simulator: Simulator) -> Worlds:
         """Return the two worlds.

@@ -4,13 +4,17 @@ Evidence is a frame that differs between the worlds: it shows what was changed. 
 follows, the same question can be asked again and again, and only its evidence is older each time.
 """
 
-from collections.abc import Iterator, Sequence
-from itertools import pairwise
+from bisect import bisect_left
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import islice, pairwise
 
 from infthor_eval.formats.twins import ComparedFrame, PairedQuestion
+from infthor_eval.generation.questions.history import TrajectoryHistory
 from infthor_eval.generation.twins.episode import Episode
+from infthor_eval.generation.twins.kinds import Proposal
 
-_MOST = 3  # ladders of a pair of worlds: those that reach farthest
+_MOST = 6  # ladders of a pair of worlds: those that reach farthest
+_CONSIDERED = 50  # edits of a kind that are compared by how far their questions may reach
 _SHORTEST = 100  # actions of a stretch
 
 
@@ -42,6 +46,27 @@ def ladders(frames: Sequence[ComparedFrame], rungs: Sequence[int]) -> list[list[
         found.append([evidence + rung for rung in rungs if evidence + rung < following])
     reaching = sorted(found, key=lambda moments: (-len(moments), moments))
     return [moments for moments in reaching[:_MOST] if moments]
+
+
+def farthest_first(
+    proposals: Iterable[Proposal], episode: Episode, rungs: Sequence[int]
+) -> list[Proposal]:
+    """Return edits with those first whose objects the episode does not show for long.
+
+    Of those that reach the same rung the kind's order stays.
+    """
+    considered = list(islice(proposals, _CONSIDERED))
+    return sorted(considered, key=lambda edit: -bisect_left(rungs, _unseen(edit, episode.history)))
+
+
+def _unseen(edit: Proposal, history: TrajectoryHistory) -> int:
+    """Return the greatest number of frames between two that show objects of an edit, or after."""
+    shown = [
+        frame
+        for frame in range(edit.index, len(history))
+        if not edit.keys.isdisjoint(history.objects_in_frame(frame))
+    ]
+    return max((after - frame for frame, after in pairwise([*shown, len(history)])), default=0)
 
 
 def that_stay(asked: Sequence[Sequence[PairedQuestion]]) -> Iterator[PairedQuestion]:

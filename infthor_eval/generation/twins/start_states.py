@@ -41,6 +41,12 @@ class _Opening:
 
     one: ThorObject
     other: ThorObject
+    index: ClassVar[int] = 0
+
+    @property
+    def keys(self) -> frozenset[str]:
+        """See `Proposal`."""
+        return frozenset({self.one.object_id, self.other.object_id})
 
     def apply(self, episode: Episode, simulator: Simulator) -> Worlds:
         """See `Proposal`."""
@@ -111,6 +117,12 @@ class _Replacement:
 
     one: ThorObject
     other: ThorObject
+    index: ClassVar[int] = 0
+
+    @property
+    def keys(self) -> frozenset[str]:
+        """See `Proposal`."""
+        return frozenset({self.one.object_id, self.other.object_id})
 
     def apply(self, episode: Episode, simulator: Simulator) -> Worlds:
         """See `Proposal`: the place where the second object was is empty in both worlds.

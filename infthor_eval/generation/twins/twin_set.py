@@ -37,6 +37,7 @@ from infthor_eval.generation.twins.final_tasks import (
     draft_final_tasks,
 )
 from infthor_eval.generation.twins.pairing import ScoreReply
+from infthor_eval.generation.twins.replays import MOST_MARKS
 from infthor_eval.storage.files import file_name, is_written, write_atomically
 from infthor_eval.thor.launch import Launch
 from infthor_eval.thor.simulator import Simulator
@@ -160,7 +161,7 @@ def make_twins(
         (out / name).mkdir(parents=True, exist_ok=True)
     claim_for_simulator(out, launch.label, launch.frames)
     run_job = partial(_draft_one, out=out, settings=settings, score=score)
-    start = partial(SimulatorWorker, partial(Simulator, launch), run_job)
+    start = partial(SimulatorWorker, partial(Simulator, launch, max_copies=MOST_MARKS), run_job)
     items = selection.items
 
     def failed(number: int, error: InfthorError) -> _DraftOutcome[TwinDraft]:
@@ -259,8 +260,8 @@ class _Numbers:
 def choose_pairs(
     trajectories: Sequence[Sequence[TwinPair]], per_trajectory: int
 ) -> list[_ChosenQuestion]:
-    """Choose paired questions, so that kinds, forms and facts are about as frequent as each other,
-    and a placebo for every four of them.
+    """Choose paired questions, so that kinds, forms, facts and numbers of rungs are about as
+    frequent as each other, and a placebo for every four of them.
 
     Args:
         trajectories: the pairs of worlds of each trajectory.
@@ -300,14 +301,15 @@ def _keys(candidate: _ChosenQuestion) -> list[tuple[str, str]]:
         ("fact", candidate.fact),
         ("kind", candidate.pair.kind),
         ("form", candidate.question.form),
+        ("reach", str(len(candidate.rungs))),
     ]
 
 
 def _use(counts: Counter[tuple[str, str]], candidate: _ChosenQuestion) -> tuple[int, int, int, str]:
     """Return how much of what a candidate has was chosen; of equals, longer ladders come first."""
-    fact, kind, form = (counts[key] for key in _keys(candidate))
+    fact, *others = (counts[key] for key in _keys(candidate))
     name = f"{candidate.pair.id}/{candidate.question.text}"
-    return fact, kind + form, -len(candidate.rungs), name
+    return fact, sum(others), -len(candidate.rungs), name
 
 
 def _without_excess(chosen: Iterable[_ChosenQuestion]) -> list[_ChosenQuestion]:

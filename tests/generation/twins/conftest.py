@@ -1,11 +1,14 @@
 """Two short trajectories, in a kitchen and in a living room."""
 
+from collections.abc import Iterator
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
 
 from infthor_eval.formats.trajectory import iter_trajectories
-from infthor_eval.generation.twins.episode import Episode, read_episode
+from infthor_eval.generation.twins.episode import Episode
+from infthor_eval.generation.twins.replays import Replays
 
 from ...helpers.trajectories import CANDLE, FORK, cut_trajectory, write_trajectories
 
@@ -18,7 +21,8 @@ def file(tmp_path_factory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def living_room(tmp_path_factory, simulator) -> Episode:
+def living_room(tmp_path_factory, simulator) -> Iterator[Episode]:
     """An episode in which things of all kinds of exchange stand where the published table says."""
     folder = write_trajectories(tmp_path_factory.mktemp("data") / "one", cut_trajectory(CANDLE, 20))
-    return read_episode(next(iter_trajectories(next(folder.iterdir()))), simulator)
+    with ExitStack() as stack:
+        yield Replays(simulator, stack).read(next(iter_trajectories(next(folder.iterdir()))))

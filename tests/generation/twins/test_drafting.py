@@ -2,6 +2,7 @@
 
 import json
 import random
+from contextlib import ExitStack
 from dataclasses import replace as replace_fields
 from functools import partial
 
@@ -34,12 +35,12 @@ from infthor_eval.generation.twins.drafting import (
     is_shown,
     name_worlds,
 )
-from infthor_eval.generation.twins.episode import read_episode
 from infthor_eval.generation.twins.exchanges import Exchange
 from infthor_eval.generation.twins.kinds import KINDS, EditKind, EditRefused, Worlds
 from infthor_eval.generation.twins.openings import CountOpen
 from infthor_eval.generation.twins.pairing import AskedWorld
 from infthor_eval.generation.twins.pictures import are_clearly_unlike
+from infthor_eval.generation.twins.replays import Replays
 from infthor_eval.generation.twins.rewriting import in_world, without_traces
 from infthor_eval.nieh.scoring import score
 
@@ -56,7 +57,8 @@ LEFT, RIGHT = slice(0, 40), slice(60, 100)  # where fridge and microwave are, in
 
 @pytest.fixture(scope="module")
 def episode(file, simulator):
-    return read_episode(next(iter_trajectories(file)), simulator)
+    with ExitStack() as stack:
+        yield Replays(simulator, stack).read(next(iter_trajectories(file)))
 
 
 def draft(file, simulator, out, *kinds, per_kind=1):
@@ -172,8 +174,8 @@ def test_an_exchange_without_room_is_refused(episode, simulator):
 
 def test_an_episode_with_a_refused_action_has_no_twins(file, simulator):
     trajectory = next(iter_trajectories(file))
-    with pytest.raises(DataError, match="PutObject"):
-        read_episode(break_action(trajectory, trajectory.scene), simulator)
+    with ExitStack() as stack, pytest.raises(DataError, match="PutObject"):
+        Replays(simulator, stack).read(break_action(trajectory, trajectory.scene))
 
 
 @pytest.fixture(scope="module")

@@ -2,17 +2,21 @@
 
 import json
 from functools import partial
+from types import SimpleNamespace
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.step_log import ObjectInFrame, Step
 from infthor_eval.formats.twins import ComparedFrame, PairedQuestion, read_pairs
+from infthor_eval.generation.questions.history import TrajectoryHistory
 from infthor_eval.generation.replay_set import select
 from infthor_eval.generation.twins import rungs
 from infthor_eval.generation.twins.drafting import TwinSettings
-from infthor_eval.generation.twins.rungs import ladders, stretches, that_stay
+from infthor_eval.generation.twins.insertions import Insertion
+from infthor_eval.generation.twins.rungs import farthest_first, ladders, stretches, that_stay
 from infthor_eval.generation.twins.twin_set import make_twins
 from infthor_eval.nieh.scoring import score
 from infthor_eval.thor.launch import embedded_launch
@@ -40,7 +44,7 @@ def test_moments_are_so_many_frames_after_a_difference_and_before_the_next():
 )
 def test_the_newest_difference_is_a_rung_before_each_moment(differing, rungs):
     found = ladders(frames(differing), rungs)
-    assert len(found) <= 3
+    assert len(found) <= 6
     for moments in found:
         evidence = {max(at for at in range(moment + 1) if differing[at]) for moment in moments}
         assert len(evidence) == 1
@@ -62,6 +66,22 @@ def test_questions_stay_as_long_as_their_answers_do():
         [asked("a", "1"), asked("b", "1"), asked("c", "1")],
     ]
     assert [question.text for question in that_stay(at_rungs)] == ["a", "b", "a", "a"]
+
+
+def test_edits_of_what_is_unseen_for_longest_come_first():
+    shown = {0: ["Fridge|1", "Egg|1"], 3: ["Fridge|1"], 12: ["Egg|1"]}
+    box = ObjectInFrame(400, (100, 100, 120, 120), True)
+    steps = [Step(at, "", seen=dict.fromkeys(shown.get(at, ()), box)) for at in range(20)]
+    episode = SimpleNamespace(history=TrajectoryHistory("made", steps))
+    # 17 frames after frame 3; 12 between 0 and 12; 8 after 12; none that shows it
+    far, middle, near, never = (
+        Insertion(at, ((), ()), frozenset({key}), frozenset())
+        for at, key in ((0, "Fridge|1"), (0, "Egg|1"), (4, "Egg|1"), (4, "Fridge|1"))
+    )
+    ordered = [never, near, middle, far]
+    assert farthest_first(ordered, episode, (1, 8, 12, 16)) == [far, middle, near, never]
+    assert farthest_first(ordered, episode, (1, 9)) == [middle, far, near, never]
+    assert farthest_first(ordered, episode, (1,)) == [near, middle, far, never]
 
 
 def test_stretches_are_beginnings_that_end_with_a_sub_goal(living_room, monkeypatch):
@@ -102,10 +122,13 @@ def test_each_question_is_asked_at_its_rungs_of_worlds_that_look_the_same_since(
     pairs = read_pairs(out)
     ages = set()
     for pair in pairs:
+        evidence_of: dict[object, int] = {}
         for question in pair.questions:
             evidence = pair.evidence(question.moment)
             age = question.moment - evidence
             ages.add(age)
+            # Nobody is asked the same once more on other evidence.
+            assert evidence_of.setdefault((question.text, question.answers), evidence) == evidence
             assert age in RUNGS
             assert all(pair.frames[at].same for at in range(evidence + 1, question.moment + 1))
             assert max(question.clues) <= question.moment
