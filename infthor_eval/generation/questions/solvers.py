@@ -303,6 +303,35 @@ def _picked_before(facts: Sequence[FrameFacts], words: str, other: str) -> list[
     return ["yes" if first[0] < second[0] else "no"]
 
 
+_COUNTED_BACK = {"last": 1, "second": 2, "third": 3, "fourth": 4, "fifth": 5}
+
+
+def _back(
+    facts: Sequence[FrameFacts], action: str, ordinal: str, _last: str | None
+) -> FactEvent | None:
+    """Return the event of a name that is so many from the end."""
+    events = events_of(facts, action)
+    back = _COUNTED_BACK[ordinal]
+    return events[-back] if len(events) >= back else None
+
+
+def _put_back(facts: Sequence[FrameFacts], *ordinal: str) -> list[str]:
+    event = _back(facts, "PutObject", *ordinal)
+    return [] if event is None else [type_of_id(event.target)]
+
+
+def _place_back(facts: Sequence[FrameFacts], *ordinal: str) -> list[str]:
+    event = _back(facts, "PutObject", *ordinal)
+    place = None if event is None else _place_put(event)
+    return [] if place is None else [place]
+
+
+def _opened_back(facts: Sequence[FrameFacts], *ordinal: str) -> list[str]:
+    event = _back(facts, "OpenObject", *ordinal)
+    return [] if event is None else [type_of_id(event.target)]
+
+
+_ORDINAL = r"(last|second|third|fourth|fifth)( to last)?"
 _SOLVERS: tuple[tuple[str, Callable[..., list[str]]], ...] = (
     (r"Is there any (.+) in this room\?", _presence),
     (r"Have you seen (.+)\?", _seen),
@@ -343,4 +372,7 @@ _SOLVERS: tuple[tuple[str, Callable[..., list[str]]], ...] = (
     (r"How many times did you put something (in|on) the (.+)\?", _puts),
     (r"How many different objects did you pick up\?", _n_picked_up),
     (r"Did you pick up the (.+) before the (.+)\?", _picked_before),
+    (rf"What did you put down {_ORDINAL}\?", _put_back),
+    (rf"Where did you put the object that you put down {_ORDINAL}\?", _place_back),
+    (rf"What did you open {_ORDINAL}\?", _opened_back),
 )

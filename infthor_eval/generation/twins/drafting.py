@@ -109,8 +109,10 @@ def draft_twins(
         parts = stretches(episode) if settings.rungs else (episode,)
         makers = [_Maker(draft, part, score, replays, out) for part in parts]
         for name in settings.kinds:
+            n_kept = 0
             for maker in makers:
-                maker.try_kind(name)
+                if n_kept < settings.per_kind:  # what the whole has too few of, its parts may have
+                    n_kept += maker.try_kind(name, settings.per_kind - n_kept)
     return draft
 
 
@@ -126,8 +128,9 @@ class _Maker:
         self._replays = replays
         self._out = out
 
-    def try_kind(self, name: str) -> None:
-        """Try the edits of a kind until enough have questions, or have been proposed."""
+    def try_kind(self, name: str, n_wanted: int) -> int:
+        """Try the edits of a kind until enough have questions, or have been proposed; return how
+        many have."""
         settings = self._draft.settings
         kind: EditKind = KINDS.load(name, EditKind)()
         stream = f"{settings.seed}/{self._draft.digest}/{name}"
@@ -141,7 +144,7 @@ class _Maker:
         if settings.rungs:
             proposals = farthest_first(proposals, self._episode, settings.rungs)
         for proposal in proposals:
-            if n_proposed == 2 * settings.per_kind or len(pairs) == settings.per_kind:
+            if n_proposed == 2 * n_wanted or len(pairs) == n_wanted:
                 break
             pair_id = f"{name}-{digest(f'{stream}/{n_proposed}', 4)}"
             n_proposed += 1
@@ -156,6 +159,7 @@ class _Maker:
         if not rejected:
             del self._draft.rejected[name]
         self._draft.pairs += pairs
+        return len(pairs)
 
     def _try(self, proposal: Proposal, kind: str, pair_id: str) -> TwinPair:
         """Make one pair, and write its worlds if it has questions.
