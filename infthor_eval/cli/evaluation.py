@@ -19,6 +19,7 @@ def evaluate(options: Mapping[str, Any]) -> DataFrame:
     from infthor_eval.cli.options.config import take_options
     from infthor_eval.cli.options.run import RunOptions
     from infthor_eval.cli.progress.runs import execute_runs
+    from infthor_eval.cli.progress.undrawn import draw_missing
     from infthor_eval.exports.lm_eval import export
     from infthor_eval.report.run_table import load_runs
     from infthor_eval.runs import prepare_all
@@ -31,6 +32,7 @@ def evaluate(options: Mapping[str, Any]) -> DataFrame:
             requests = RunOptions.from_click(context.params).requests()
     except click.ClickException as error:
         raise UsageError(error.format_message()) from error
+    draw_missing(requests)
     runs = prepare_all(requests)
     outcomes, is_stopped = execute_runs(runs, finish=export)
     if is_stopped:

@@ -36,6 +36,7 @@ from infthor_eval.generation.settings import TrajectorySettings
 from infthor_eval.generation.twins.drafting import TwinSettings
 from infthor_eval.generation.twins.pairing import ScoreReply
 from infthor_eval.generation.twins.twin_set import TwinSummary, make_twins
+from infthor_eval.generation.twins.undrawn import pack_worlds
 from infthor_eval.storage.digests import digest_of_file, fingerprint
 from infthor_eval.storage.files import remove, write_atomically
 from infthor_eval.thor.launch import embedded_launch
@@ -92,6 +93,7 @@ class TwinsManifest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         trajectories: trajectories to generate, of which twins are made.
         twins: how twins are made; manifests of questions have no such field.
         per_trajectory: maximum number of paired questions on one trajectory.
+        frames: False for the trajectories of the worlds in place of their frames.
         colors: number of colours of the pictures of one trajectory.
         files: digests of all files of the set by path; empty in a manifest before the first build.
     """
@@ -100,6 +102,7 @@ class TwinsManifest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     trajectories: Annotated[tuple[TrajectoryRecipe, ...], Meta(min_length=1)]
     twins: TwinSettings
     per_trajectory: Annotated[int, Meta(ge=1)] = 25
+    frames: bool = True
     colors: Annotated[int, Meta(ge=2, le=255)] = 64
     files: dict[str, str] = {}
 
@@ -161,6 +164,7 @@ def build_twins(
     manifest: TwinsManifest,
     score: ScoreReply,
     out: Path,
+    worker_settings: WorkerSettings,
     advance: Callable[[bool], None] = lambda _: None,
 ) -> tuple[TwinsManifest, TwinSummary]:
     """Build the set: generate trajectories, make twins of them, keep what their questions need.
@@ -169,6 +173,7 @@ def build_twins(
         manifest: the manifest; its digests are not used.
         score: the strict score of a reply.
         out: folder of the set: new, empty, or with a build that was stopped.
+        worker_settings: number and place of the workers; they do not change the set.
         advance: called twice for each trajectory, with True if it is of an earlier run.
 
     Returns:
@@ -184,13 +189,16 @@ def build_twins(
             manifest.twins,
             score,
             per_trajectory=manifest.per_trajectory,
-            worker_settings=WorkerSettings(),
+            worker_settings=worker_settings,
             advance=advance,
         )
         _raise_first(summary.failures)
         whole = work / _SET
         whole.mkdir()
-        copy_compactly(work / _REPLAYED, whole, manifest.colors)
+        if manifest.frames:
+            copy_compactly(work / _REPLAYED, whole, manifest.colors)
+        else:
+            pack_worlds(work / _REPLAYED, whole)
         return _write_manifest(manifest, whole), summary
 
 

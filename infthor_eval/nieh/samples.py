@@ -11,6 +11,7 @@ from infthor_eval.errors import DataError, UsageError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question, SkippedQuestion
+from infthor_eval.formats.undrawn import drawn_folder, is_drawn, is_undrawn
 from infthor_eval.nieh.contexts import (
     DEFAULT_CONTEXT,
     Context,
@@ -138,13 +139,26 @@ def find_set(
         trajectories: folder of the set's trajectories; None if they are in the set.
     """
     if bundled:
-        return open_set(str(packaged_folder(f"sets/{bundled}")), trajectories)
+        return open_set(str(_bundled_folder(bundled)), trajectories)
     if data is None and not default_folder().is_dir():
         raise UsageError(
             "no NIEH set to ask about; give its folder with --data, or fetch the published one: "
             "fetch nieh"
         )
     return open_set(str(data or default_folder()), trajectories)
+
+
+def _bundled_folder(name: str) -> Path:
+    """Return the folder of a bundled set with its frames."""
+    folder = packaged_folder(f"sets/{name}")
+    if not is_undrawn(folder):
+        return folder
+    if not is_drawn(folder):
+        raise UsageError(
+            f"the frames of {name} are not drawn on this machine yet; `infthor-eval --model oracle "
+            f"--tasks {name}` draws them, once"
+        )
+    return drawn_folder(folder)
 
 
 def find_samples(config: Mapping[str, Any], limit: int | None = None) -> TaskSamples:

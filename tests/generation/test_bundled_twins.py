@@ -22,6 +22,7 @@ from infthor_eval.generation.bundle import (
 from infthor_eval.nieh.scoring import score
 from infthor_eval.storage.digests import digest_of_file
 from infthor_eval.storage.folders import packaged_folder
+from infthor_eval.workers import WorkerSettings
 
 BUNDLED = packaged_folder("sets/nieh_mini_twins")
 
@@ -141,8 +142,8 @@ def test_twins_are_built_again_byte_for_byte(pairs, tmp_path):
     manifest = _manifest()
     part = msgspec.structs.replace(manifest, trajectories=manifest.trajectories[2:3])
     strict = partial(score, scorer="strict")
-    built, numbers = build_twins(part, strict, tmp_path / "one")
-    again, _ = build_twins(part, strict, tmp_path / "other")
+    built, numbers = build_twins(part, strict, tmp_path / "one", WorkerSettings())
+    again, _ = build_twins(part, strict, tmp_path / "other", WorkerSettings())
     assert differing_files(built, again) == []
     assert numbers.trajectories == 1
     made = {pair.id: pair for pair in read_pairs(tmp_path / "one")}

@@ -24,6 +24,7 @@ from infthor_eval.cli.progress.notes import (
     quiet_notes,
 )
 from infthor_eval.cli.progress.runs import check_others, execute_runs
+from infthor_eval.cli.progress.undrawn import draw_missing
 from infthor_eval.cli.results import print_failures, print_results
 from infthor_eval.errors import DataError
 from infthor_eval.reasons import count_reasons
@@ -129,6 +130,7 @@ def evaluate(
 
     senders = Trackers(**(trackers or {}))
     with quiet_notes(show.quiet):
+        draw_missing(requests)
         # Retrieval embeds every frame, which takes minutes.
         with NOTES.status("reading the tasks and their data"), prints_as_notes():
             runs = prepare_all(requests)

@@ -5,7 +5,6 @@ An eye must see in the pictures what differs: objects, actions, the answer to a 
 """
 
 import random
-import shutil
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from itertools import chain
@@ -15,9 +14,8 @@ import msgspec
 from msgspec.structs import replace
 
 from infthor_eval.formats.object_ids import object_type_of
-from infthor_eval.formats.shared_frames import store_picture, write_frame_names
 from infthor_eval.formats.step_log import ObjectInFrame, Step
-from infthor_eval.formats.trajectory import Trajectory, encode_trajectory
+from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.formats.twins import ComparedFrame, PairedQuestion, TwinPair
 from infthor_eval.generation.twins.comparison import Difference, World, compare
 from infthor_eval.generation.twins.episode import Episode
@@ -40,10 +38,8 @@ from infthor_eval.generation.twins.rungs import (
 from infthor_eval.generation.twins.tolerance import tolerance_of
 from infthor_eval.household.wording import canonical_type
 from infthor_eval.storage.digests import digest
-from infthor_eval.storage.files import file_name, write_atomically
+from infthor_eval.storage.files import file_name
 from infthor_eval.thor.simulator import Simulator
-
-_COPIED = ("metadata.json", "traj.txt", "state_summary.json")
 
 
 class TwinSettings(msgspec.Struct, frozen=True):
@@ -238,19 +234,8 @@ class _Maker:
         ]
         pictures = (first, shared)
         for side, replayed in enumerate(replays):
-            name = pair.traj_ids[side]
-            final = self._out / "metadata" / name
-            if final.exists():
-                shutil.rmtree(final)  # of a run that was interrupted before this draft was whole
-            with write_atomically(final) as folder:
-                folder.mkdir()
-                for file in _COPIED:
-                    shutil.copyfile(replayed.folder / file, folder / file)
-                document = encode_trajectory(without_traces(worlds.pair[side], name))
-                (folder / "traj_data.json").write_bytes(document)
-                write_frame_names(
-                    folder, [store_picture(self._out, image, name) for image in pictures[side]]
-                )
+            world = without_traces(worlds.pair[side], pair.traj_ids[side])
+            replayed.write(self._out, world, pictures[side])
 
 
 def is_flipped(pair_id: str) -> bool:

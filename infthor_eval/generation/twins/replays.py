@@ -4,7 +4,8 @@ Each world is replayed once, each picture drawn once, and a world begins where i
 episode.
 """
 
-from collections.abc import Iterator
+import shutil
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,8 +13,9 @@ from pathlib import Path
 import msgspec
 
 from infthor_eval.errors import DataError
+from infthor_eval.formats.shared_frames import store_picture, write_frame_names
 from infthor_eval.formats.step_log import read_steps
-from infthor_eval.formats.trajectory import ApiAction, Trajectory
+from infthor_eval.formats.trajectory import ApiAction, Trajectory, encode_trajectory
 from infthor_eval.generation.questions.history import TrajectoryHistory
 from infthor_eval.generation.replay import Beginning, replay
 from infthor_eval.generation.simulator_jobs import JobProgress
@@ -21,6 +23,7 @@ from infthor_eval.generation.twins.comparison import Difference, World
 from infthor_eval.generation.twins.episode import Episode
 from infthor_eval.generation.twins.rewriting import without_traces
 from infthor_eval.storage.digests import digest, digest_of_file
+from infthor_eval.storage.files import write_atomically
 from infthor_eval.storage.scratch import ScratchFolder
 from infthor_eval.thor.drawn_pictures import DrawnPictures
 from infthor_eval.thor.grounding import Grounding
@@ -31,6 +34,7 @@ from infthor_eval.thor.view import SimulatorView
 WORLD = "twin"  # what a world is called while it is replayed
 MOST_MARKS = 128  # of an episode; a simulator stores the state at each
 _MARKED = 50  # actions from one mark to the next
+_COPIED = ("metadata.json", "traj.txt", "state_summary.json")
 _HINT = "give a trajectory that replays here"
 
 
@@ -40,6 +44,19 @@ class Replayed:
 
     world: World
     folder: Path
+
+    def write(self, out: Path, world: Trajectory, pictures: Sequence[Path]) -> None:
+        """Write the world into a set, by its trajectory there and the files of its pictures."""
+        name = world.traj_id
+        final = out / "metadata" / name
+        if final.exists():
+            shutil.rmtree(final)  # of a run that was interrupted before its draft was whole
+        with write_atomically(final) as folder:
+            folder.mkdir()
+            for file in _COPIED:
+                shutil.copyfile(self.folder / file, folder / file)
+            (folder / "traj_data.json").write_bytes(encode_trajectory(world))
+            write_frame_names(folder, [store_picture(out, image, name) for image in pictures])
 
 
 class Replays:

@@ -8,6 +8,7 @@ from infthor_eval.formats.step_log import read_steps
 from infthor_eval.generation.questions.checker import Checker
 from infthor_eval.generation.questions.generate import candidates_of, further_candidates_of
 from infthor_eval.generation.questions.history import DEFAULT_SHARE, TrajectoryHistory
+from infthor_eval.generation.questions.recency import recent
 
 from ...helpers.bundled import BUNDLED, bundled_name
 
@@ -32,4 +33,8 @@ def asked(history):
     """All candidates of the rules."""
     rng = random.Random(0)
     types = history.all_object_types | {"Mug", "Bowl"}
-    return [*candidates_of(history, types, rng), *further_candidates_of(history, rng)]
+    return [
+        *candidates_of(history, types, rng),
+        *further_candidates_of(history, rng),
+        *recent(history),
+    ]

@@ -5,15 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from infthor_eval.cli.help import ExampleCommand
 from infthor_eval.cli.options.values import PATH
+from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
 
 if TYPE_CHECKING:
     from infthor_eval.generation.bundle import Manifest, TwinsManifest
+    from infthor_eval.workers import WorkerSettings
 
 
 @click.command(
@@ -28,11 +30,12 @@ if TYPE_CHECKING:
     required=True,
     help="Folder of the set, new, empty, or with a build that was stopped.",
 )
-def command(manifest: Path, out: Path) -> int:
+@worker_options
+def command(manifest: Path, out: Path, **workers: Any) -> int:
     """Build the set that MANIFEST describes: trajectories, frames, questions or twins.
 
     If the manifest has digests, as that of a bundled set does, the files are compared with them;
-    exit code 1 if one differs.
+    exit code 1 if one differs. Workers share the making of twins.
     """
     from infthor_eval.cli.progress.bar import PacedBar
     from infthor_eval.generation.bundle import Manifest, differing_files, read_manifest
@@ -40,13 +43,14 @@ def command(manifest: Path, out: Path) -> int:
     from infthor_eval.terminal import error_console, print_line, progress_bar
 
     expected = read_manifest(manifest)
+    worker_settings = parse_worker_settings(**workers)
     with hold_folder(out), progress_bar(error_console()) as progress:
         bar = PacedBar(progress, expected.name, 2 * len(expected.trajectories))
         built: Manifest | TwinsManifest
         if isinstance(expected, Manifest):
             built, lines = _build_questions(expected, out, bar.advance)
         else:
-            built, lines = _build_twins(expected, out, bar.advance)
+            built, lines = _build_twins(expected, out, worker_settings, bar.advance)
     size = sum((out / name).stat().st_size for name in built.files)
     print_line(f"{lines[0]}, {size / 1e6:.1f} MB: {out}")
     print_line(lines[1])
@@ -75,13 +79,18 @@ def _build_questions(
 
 
 def _build_twins(
-    manifest: TwinsManifest, out: Path, advance: Callable[[bool], None]
+    manifest: TwinsManifest,
+    out: Path,
+    worker_settings: WorkerSettings,
+    advance: Callable[[bool], None],
 ) -> tuple[TwinsManifest, tuple[str, str]]:
     """Build a set of twins; return what `_build_questions` does."""
     from infthor_eval.generation.bundle import build_twins
     from infthor_eval.nieh.scoring import score
 
-    built, numbers = build_twins(manifest, partial(score, scorer="strict"), out, advance)
+    built, numbers = build_twins(
+        manifest, partial(score, scorer="strict"), out, worker_settings, advance
+    )
     content = (
         f"{numbers.pairs} paired questions of {numbers.found} on {numbers.facts} facts of "
         f"{numbers.trajectories} trajectories"

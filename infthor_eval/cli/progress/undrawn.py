@@ -1,0 +1,44 @@
+"""Drawing the frames of bundled sets that come without, before a run asks about them."""
+
+from collections.abc import Sequence
+
+from infthor_eval.cli.progress.notes import print_note
+from infthor_eval.runs import RunRequest, Suite
+from infthor_eval.storage.folders import packaged_folder
+from infthor_eval.terminal import error_console, progress_bar
+
+
+def draw_missing(requests: Sequence[tuple[RunRequest, Suite]]) -> None:
+    """Draw the frames of the bundled sets of some runs that are not drawn on this machine yet."""
+    from infthor_eval.formats.undrawn import is_drawn, is_undrawn
+
+    tasks = [task for request, _ in requests for task in request.tasks.tasks]
+    settings = (task.settings.get("dataset_kwargs") or {} for task in tasks)
+    for name in dict.fromkeys(it["bundled"] for it in settings if "bundled" in it):
+        folder = packaged_folder(f"sets/{name}")
+        if is_undrawn(folder) and not is_drawn(folder):
+            _draw(name)
+
+
+def _draw(name: str) -> None:
+    from infthor_eval.cli.progress.bar import PacedBar
+    from infthor_eval.formats.undrawn import drawn_folder
+    from infthor_eval.generation.twins.undrawn import draw_worlds, n_worlds
+    from infthor_eval.storage.files import hold_folder
+    from infthor_eval.thor.launch import embedded_launch
+    from infthor_eval.thor.simulator import Simulator
+
+    packed = packaged_folder(f"sets/{name}")
+    out = drawn_folder(packed)
+    print_note(f"{name} comes without frames; they are drawn once, which takes minutes: {out}")
+    out.mkdir(parents=True, exist_ok=True)
+    with hold_folder(out), progress_bar(error_console()) as progress:
+        bar = PacedBar(progress, f"frames of {name}", n_worlds(packed))
+        with Simulator(embedded_launch()) as simulator:
+            differing = draw_worlds(packed, out, simulator, lambda: bar.advance(False))
+    if differing:
+        print_note(
+            f"{name}: {len(differing)} of {n_worlds(packed)} trajectories are drawn otherwise on "
+            "this machine than where the set was made; figures are of these frames",
+            "yellow",
+        )

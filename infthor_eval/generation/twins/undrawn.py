@@ -1,0 +1,119 @@
+"""Packing sets of twins as their worlds' trajectories, and drawing the frames from these.
+
+The embedded simulator draws the same frames again. A digest of each world shows whether it did.
+"""
+
+import shutil
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+import msgspec
+from msgspec.structs import replace
+
+from infthor_eval.errors import DataError
+from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.reading import read_json, read_text
+from infthor_eval.formats.step_log import read_steps
+from infthor_eval.formats.trajectory import Trajectory, TrajectorySource, iter_trajectories
+from infthor_eval.formats.twins import TwinPair, read_pairs, write_pairs
+from infthor_eval.formats.undrawn import DIGESTS, SET_INFO, WORLDS
+from infthor_eval.generation.twins.comparison import Difference
+from infthor_eval.generation.twins.replays import WORLD, Replays
+from infthor_eval.generation.twins.rewriting import first_subgoals, without_traces
+from infthor_eval.storage.digests import digest
+from infthor_eval.storage.files import write_packed
+from infthor_eval.thor.simulator import Simulator
+
+_HINT = "install infthor-eval again"
+
+
+def pack_worlds(source: Path, out: Path) -> None:
+    """Write a set of twins without frames, each world up to the sub-goal of its last question.
+
+    Args:
+        source: the set, with frames; all its questions have moments.
+        out: folder of the new set, which exists and is empty.
+    """
+    data = NiehSet(source)
+    pairs, lines, digests = [], [], {}
+    for pair in read_pairs(source):
+        n_frames = 0
+        for name in pair.traj_ids:
+            world = _up_to_last_moment(data, name, pair)
+            n_frames = len(world.plan.low_actions) + 1
+            lines.append(msgspec.json.encode(world))
+            digests[name] = _digest(data, name, n_frames)
+        pairs.append(replace(pair, frames=pair.frames[:n_frames]))
+    write_packed(out / WORLDS.removesuffix(".xz"), b"\n".join(lines) + b"\n")
+    (out / DIGESTS).write_bytes(msgspec.json.format(msgspec.json.encode(digests), indent=1) + b"\n")
+    write_pairs(out, pairs)
+    _copy_rest(source, out, data.files)
+
+
+def draw_worlds(
+    packed: Path, out: Path, simulator: Simulator, advance: Callable[[], None] = lambda: None
+) -> list[str]:
+    """Write a packed set with its frames; worlds that are there already are not drawn again.
+
+    Args:
+        packed: the set without frames.
+        out: folder of the new set, which exists.
+        simulator: the embedded simulator.
+        advance: called after each world.
+
+    Returns:
+        The names of the worlds that are drawn otherwise here than where the set was made.
+
+    Raises:
+        DataError: a world cannot be carried out here.
+    """
+    expected = read_json(packed / DIGESTS, _HINT, dict[str, str])
+    differing = []
+    (out / "metadata").mkdir(exist_ok=True)
+    with ExitStack() as stack:
+        replays = Replays(simulator, stack)
+        for world in _worlds(packed):
+            name = world.traj_id
+            if not (out / "metadata" / name).exists():
+                try:
+                    replayed = replays.replayed(without_traces(world, WORLD))
+                except Difference as error:
+                    raise DataError(f"{packed / WORLDS}: {name}: {error}; {_HINT}") from error
+                replayed.write(out, world, replayed.world.files)
+            if _digest(NiehSet(out, needs_questions=False), name) != expected[name]:
+                differing.append(name)
+            advance()
+    write_pairs(out, read_pairs(packed))
+    _copy_rest(packed, out, NiehSet(packed).files)  # it says that all is there
+    return differing
+
+
+def n_worlds(packed: Path) -> int:
+    """Return the number of worlds of a packed set."""
+    return len(read_json(packed / DIGESTS, _HINT, dict[str, str]))
+
+
+def _worlds(packed: Path) -> Iterator[Trajectory]:
+    path = packed / WORLDS
+    for number, line in enumerate(read_text(path, _HINT).splitlines(), 1):
+        yield TrajectorySource(path, number, line.encode()).read()
+
+
+def _up_to_last_moment(data: NiehSet, name: str, pair: TwinPair) -> Trajectory:
+    (world,) = iter_trajectories(data.folder(name) / "traj_data.json")
+    last = max(question.moment or 0 for question in pair.questions)
+    n_high = world.plan.low_actions[last - 1].high_idx + 1
+    return without_traces(first_subgoals(world, n_high), name)
+
+
+def _digest(data: NiehSet, name: str, n_frames: int | None = None) -> str:
+    """Return a digest of a world's first frames and their entries in its log."""
+    pictures = [frame.path.stem for frame in data.frames(name)[:n_frames]]
+    steps = read_steps(data.folder(name))[:n_frames]
+    return digest(msgspec.json.encode((steps, pictures)))
+
+
+def _copy_rest(source: Path, out: Path, files: Iterable[str]) -> None:
+    for file in (*(f"{name}.csv" for name in files), SET_INFO):
+        shutil.copyfile(source / file, out / file)
