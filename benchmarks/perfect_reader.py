@@ -10,7 +10,7 @@ it says what a person would: "no" if asked whether something is there, otherwise
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import Any
 
@@ -19,7 +19,7 @@ from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.step_log import Step, read_steps
 from infthor_eval.generation.questions.checker import Checker
 from infthor_eval.generation.questions.history import DEFAULT_SHARE
-from infthor_eval.storage.folders import packaged_folder
+from infthor_eval.nieh.samples import find_set
 from model_adapters import (
     Capabilities,
     Decoding,
@@ -41,9 +41,11 @@ class ReaderOptions:
 
     Attributes:
         bundled: name of the bundled set that the frames are of.
+        data: folder of another set that they are of; "" for the bundled one.
     """
 
     bundled: str = "nieh_mini_twins"
+    data: str = ""
 
 
 class _Log:
@@ -100,19 +102,20 @@ class PerfectReader:
     Options = ReaderOptions
     capabilities = _CAPABILITIES
 
-    def __init__(self, name: str, bundled: str) -> None:
+    def __init__(self, name: str, options: ReaderOptions) -> None:
         self.name = name
-        self._bundled = bundled
-        self._set = NiehSet(packaged_folder(f"sets/{bundled}"))
+        self._options = options
+        bundled = None if options.data else options.bundled
+        self._set = find_set(data=options.data or None, bundled=bundled)
 
     @classmethod
     def build(cls, name: str, options: ReaderOptions, seed: int) -> "PerfectReader":  # noqa: ARG003
         """Open the set; nothing is drawn."""
-        return cls(name, options.bundled)
+        return cls(name, options)
 
     def identity(self) -> dict[str, Any]:
         """The set."""
-        return {"bundled": self._bundled, "set": self._set.fingerprint}
+        return {**asdict(self._options), "set": self._set.fingerprint}
 
     def tokens_per_frame(self, frame: FrameRef) -> None:
         """Tokens are not counted."""

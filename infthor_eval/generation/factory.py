@@ -38,7 +38,7 @@ from infthor_eval.household.scout import reachable_grid
 from infthor_eval.household.symbolic import Operator, SymbolicRoom, room_of
 from infthor_eval.household.tasks import Task, TaskType, sub_task
 from infthor_eval.thor.restore import restore
-from infthor_eval.thor.simulator import Simulator, SimulatorMark
+from infthor_eval.thor.simulator import NO_RENDERING, Simulator, SimulatorMark
 from infthor_eval.thor.view import SimulatorView, ThorObject
 
 _MAX_ADDED = 8  # ordinary tasks, where a final task is to need a memory and none does
@@ -48,7 +48,6 @@ _Size = tuple[float, ...]
 # tasks after which a failure is forgotten: other objects have moved and may have cleared the way
 _LIFETIME = 24
 _NEAR = 0.02  # tolerance of positions and sizes, metres
-_NO_PICTURES = {"renderImage": False, "renderInstanceSegmentation": False}
 
 
 @dataclass
@@ -543,7 +542,7 @@ class _ForcedTrace(Trace):
 
     def act(self, api: ApiAction, arguments: dict[str, Any], suffix: str = "") -> None:
         """Execute one action; raises as that of a trace does."""
-        super().act(api, {**arguments, **_NO_PICTURES, "forceAction": True}, suffix)
+        super().act(api, {**arguments, **NO_RENDERING, "forceAction": True}, suffix)
 
 
 def _rehearse(task: Task, operators: list[Operator], simulator: Simulator) -> RolloutError | None:

@@ -20,7 +20,7 @@ from infthor_eval.thor.view import SimulatorView, teleport_call, view_of
 _CallResult = tuple[dict[str, Any], bool]  # a call, and whether it succeeded
 _LOG = logging.getLogger(__name__)
 _INITIAL = {"gridSize": 0.25, "fieldOfView": 60, "visibilityDistance": 1.5, "snapToGrid": True}
-_NO_RENDERING = {
+NO_RENDERING = {
     "renderImage": False,
     "renderInstanceSegmentation": False,
     "renderDepthImage": False,
@@ -228,7 +228,7 @@ class Simulator:
 
     def _restore(self, mark: SimulatorMark) -> bool:
         slot = self._copies.pop(mark, None)
-        if slot is None or not self.query("RestoreState", slot=slot, **_NO_RENDERING).success:
+        if slot is None or not self.query("RestoreState", slot=slot, **NO_RENDERING).success:
             return False
         self._copies[mark] = slot  # now the most recently used one
         return True

@@ -11,7 +11,7 @@ from infthor_eval.formats.trajectory import ObjectPose, Scene
 from infthor_eval.generation.twins.kinds import EditRefused
 from infthor_eval.generation.twins.tolerance import tolerance_of
 from infthor_eval.thor.restore import restore
-from infthor_eval.thor.simulator import Simulator
+from infthor_eval.thor.simulator import NO_RENDERING, Simulator
 from infthor_eval.thor.view import Box, SimulatorView, ThorObject, Vector
 
 _Offset = tuple[float, float]
@@ -131,6 +131,7 @@ class _Mover:
                 "PlaceObjectAtPoint",
                 objectId=item.object_id,
                 position=_foot(where, offset),
+                **NO_RENDERING,
             )
             return view.success and _has_place(view, item, where)
         position = self._inside(waiting, where, container, offset)
@@ -280,6 +281,7 @@ def _lift(simulator: Simulator, item: ThorObject, position: dict[str, float]) ->
         rotation=asdict(item.rotation),
         forceAction=True,
         forceKinematic=True,
+        **NO_RENDERING,
     )
 
 
