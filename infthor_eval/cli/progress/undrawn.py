@@ -1,5 +1,6 @@
 """Drawing the frames of bundled sets that come without, before a run asks about them."""
 
+import os
 from collections.abc import Sequence
 
 from infthor_eval.cli.progress.notes import print_note
@@ -22,23 +23,25 @@ def draw_missing(requests: Sequence[tuple[RunRequest, Suite]]) -> None:
 
 def _draw(name: str) -> None:
     from infthor_eval.cli.progress.bar import PacedBar
+    from infthor_eval.formats.twins import read_pairs
     from infthor_eval.formats.undrawn import drawn_folder
-    from infthor_eval.generation.twins.undrawn import draw_worlds, n_worlds
+    from infthor_eval.generation.twins.undrawn import draw_worlds, expected_digests
     from infthor_eval.storage.files import hold_folder
-    from infthor_eval.thor.launch import embedded_launch
-    from infthor_eval.thor.simulator import Simulator
+    from infthor_eval.workers import WorkerSettings
 
     packed = packaged_folder(f"sets/{name}")
     out = drawn_folder(packed)
     print_note(f"{name} comes without frames; they are drawn once, which takes minutes: {out}")
     out.mkdir(parents=True, exist_ok=True)
+    n_scenes = len({pair.floor_plan for pair in read_pairs(packed)})
+    workers = WorkerSettings(min(n_scenes, os.cpu_count() or 1))
     with hold_folder(out), progress_bar(error_console()) as progress:
-        bar = PacedBar(progress, f"frames of {name}", n_worlds(packed))
-        with Simulator(embedded_launch()) as simulator:
-            differing = draw_worlds(packed, out, simulator, lambda: bar.advance(False))
+        bar = PacedBar(progress, f"scenes of {name}", n_scenes)
+        differing = draw_worlds(packed, out, workers, bar.advance)
     if differing:
+        n_worlds = len(expected_digests(packed))
         print_note(
-            f"{name}: {len(differing)} of {n_worlds(packed)} trajectories are drawn otherwise on "
-            "this machine than where the set was made; figures are of these frames",
+            f"{name}: {len(differing)} of {n_worlds} trajectories are drawn otherwise on this "
+            "machine than where the set was made; figures are of these frames",
             "yellow",
         )

@@ -4,26 +4,34 @@ The embedded simulator draws the same frames again. A digest of each world shows
 """
 
 import shutil
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 
 import msgspec
 from msgspec.structs import replace
 
-from infthor_eval.errors import DataError
+from infthor_eval.errors import DataError, SimulatorError
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.reading import read_json, read_text
 from infthor_eval.formats.step_log import read_steps
 from infthor_eval.formats.trajectory import Trajectory, TrajectorySource, iter_trajectories
 from infthor_eval.formats.twins import TwinPair, read_pairs, write_pairs
 from infthor_eval.formats.undrawn import DIGESTS, SET_INFO, WORLDS
+from infthor_eval.generation.simulator_jobs import (
+    SimulatorWorker,
+    collect_outcomes,
+    freeze_existing_objects,
+)
 from infthor_eval.generation.twins.comparison import Difference
 from infthor_eval.generation.twins.replays import WORLD, Replays
 from infthor_eval.generation.twins.rewriting import first_subgoals, without_traces
 from infthor_eval.storage.digests import digest
 from infthor_eval.storage.files import write_packed
+from infthor_eval.thor.launch import embedded_launch
 from infthor_eval.thor.simulator import Simulator
+from infthor_eval.workers import WorkerSettings, run_jobs
 
 _HINT = "install infthor-eval again"
 
@@ -51,16 +59,32 @@ def pack_worlds(source: Path, out: Path) -> None:
     _copy_rest(source, out, data.files)
 
 
+class Drawn(msgspec.Struct):
+    """What became of the worlds of one scene.
+
+    Attributes:
+        differing: names of those that are drawn otherwise here than where the set was made.
+        failure: why one cannot be carried out here; empty if all can.
+    """
+
+    differing: list[str] = msgspec.field(default_factory=list)
+    failure: str = ""
+    is_resumed: bool = False
+
+
 def draw_worlds(
-    packed: Path, out: Path, simulator: Simulator, advance: Callable[[], None] = lambda: None
+    packed: Path,
+    out: Path,
+    worker_settings: WorkerSettings,
+    advance: Callable[[bool], None] = lambda _: None,
 ) -> list[str]:
     """Write a packed set with its frames; worlds that are there already are not drawn again.
 
     Args:
         packed: the set without frames.
         out: folder of the new set, which exists.
-        simulator: the embedded simulator.
-        advance: called after each world.
+        worker_settings: number of the workers that share the scenes.
+        advance: called after each scene.
 
     Returns:
         The names of the worlds that are drawn otherwise here than where the set was made.
@@ -68,30 +92,47 @@ def draw_worlds(
     Raises:
         DataError: a world cannot be carried out here.
     """
-    expected = read_json(packed / DIGESTS, _HINT, dict[str, str])
-    differing = []
     (out / "metadata").mkdir(exist_ok=True)
-    with ExitStack() as stack:
+    scenes: dict[str, list[Trajectory]] = {}
+    for world in _worlds(packed):
+        scenes.setdefault(world.scene.floor_plan, []).append(world)
+    draw = partial(_draw, expected=expected_digests(packed), out=out)
+    start = partial(SimulatorWorker, partial(Simulator, embedded_launch()), draw)
+    drawn = collect_outcomes(
+        run_jobs(start, list(scenes.values()), worker_settings, lambda _: None),
+        lambda _, error: Drawn(failure=str(error)),
+        advance,
+    )
+    for failure in (it.failure for it in drawn if it.failure):
+        raise DataError(f"{packed / WORLDS}: {failure}; {_HINT}")
+    write_pairs(out, read_pairs(packed))
+    _copy_rest(packed, out, NiehSet(packed).files)  # it says that all is there
+    return [name for it in drawn for name in it.differing]
+
+
+def _draw(
+    worlds: Sequence[Trajectory], simulator: Simulator, expected: Mapping[str, str], out: Path
+) -> Drawn:
+    drawn = Drawn()
+    with ExitStack() as stack, freeze_existing_objects():
         replays = Replays(simulator, stack)
-        for world in _worlds(packed):
+        for world in worlds:
             name = world.traj_id
             if not (out / "metadata" / name).exists():
                 try:
                     replayed = replays.replayed(without_traces(world, WORLD))
-                except Difference as error:
-                    raise DataError(f"{packed / WORLDS}: {name}: {error}; {_HINT}") from error
+                except (Difference, SimulatorError) as error:
+                    return Drawn(failure=f"{name}: {error}")
                 replayed.write(out, world, replayed.world.files)
             if _digest(NiehSet(out, needs_questions=False), name) != expected[name]:
-                differing.append(name)
-            advance()
-    write_pairs(out, read_pairs(packed))
-    _copy_rest(packed, out, NiehSet(packed).files)  # it says that all is there
-    return differing
+                drawn.differing.append(name)
+    return drawn
 
 
-def n_worlds(packed: Path) -> int:
-    """Return the number of worlds of a packed set."""
-    return len(read_json(packed / DIGESTS, _HINT, dict[str, str]))
+def expected_digests(packed: Path) -> dict[str, str]:
+    """Return the digest of each world's frames and log where the set was made, by its name."""
+    digests: dict[str, str] = read_json(packed / DIGESTS, _HINT, dict[str, str])
+    return digests
 
 
 def _worlds(packed: Path) -> Iterator[Trajectory]:

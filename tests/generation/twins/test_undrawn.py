@@ -15,10 +15,11 @@ from infthor_eval.formats.undrawn import DIGESTS, WORLDS, drawn_folder, is_drawn
 from infthor_eval.generation.replay_set import select
 from infthor_eval.generation.twins.drafting import TwinSettings
 from infthor_eval.generation.twins.twin_set import make_twins
-from infthor_eval.generation.twins.undrawn import draw_worlds, n_worlds, pack_worlds
+from infthor_eval.generation.twins.undrawn import draw_worlds, expected_digests, pack_worlds
 from infthor_eval.nieh import samples
 from infthor_eval.nieh.scoring import score
 from infthor_eval.thor.launch import embedded_launch
+from infthor_eval.thor.simulator import Simulator
 from infthor_eval.workers import WorkerSettings
 
 from ...helpers.command_line import read_success
@@ -48,11 +49,11 @@ def packed(whole, tmp_path):
 
 
 def test_frames_and_logs_are_those_of_the_set_up_to_the_last_sub_goal_asked_about(
-    whole, packed, simulator, tmp_path
+    whole, packed, tmp_path
 ):
     drawn = tmp_path / "drawn"
     drawn.mkdir()
-    assert draw_worlds(packed, drawn, simulator) == []
+    assert draw_worlds(packed, drawn, WorkerSettings()) == []
     original, again = NiehSet(whole), NiehSet(drawn)
     assert [repr(it) for it in original.questions] == [repr(it) for it in again.questions]
     n_shorter = 0
@@ -69,38 +70,42 @@ def test_frames_and_logs_are_those_of_the_set_up_to_the_last_sub_goal_asked_abou
             steps = read_steps(again.folder(name))
             assert steps == read_steps(original.folder(name))[: len(frames)]
     assert n_shorter
-    assert n_worlds(packed) == len({name for pair in read_pairs(drawn) for name in pair.traj_ids})
+    assert len(expected_digests(packed)) == len(
+        {name for pair in read_pairs(drawn) for name in pair.traj_ids}
+    )
     assert not list(packed.rglob("*.png"))
 
 
 def test_what_is_drawn_already_is_not_drawn_again_and_what_differs_is_named(
-    packed, simulator, tmp_path, monkeypatch
+    packed, tmp_path, monkeypatch
 ):
     drawn = tmp_path / "drawn"
     drawn.mkdir()
-    draw_worlds(packed, drawn, simulator)
+    draw_worlds(packed, drawn, WorkerSettings())
     digests = json.loads((packed / DIGESTS).read_text())
     first, second, *_ = digests
     (packed / DIGESTS).write_text(json.dumps({**digests, second: "0"}))
     shutil.rmtree(drawn / "metadata" / first)
     steps = []
-    step = simulator.step
+    step = Simulator.step
     monkeypatch.setattr(
-        simulator, "step", lambda action, **more: steps.append(action) or step(action, **more)
+        Simulator,
+        "step",
+        lambda self, action, **more: steps.append(action) or step(self, action, **more),
     )
-    assert draw_worlds(packed, drawn, simulator) == [second]
+    assert draw_worlds(packed, drawn, WorkerSettings()) == [second]
     assert (drawn / "metadata" / first / "traj_data.json").is_file()
     assert 0 < len(steps) < 60
 
 
-def test_a_world_that_cannot_be_carried_out_is_named(packed, simulator, tmp_path):
+def test_a_world_that_cannot_be_carried_out_is_named(packed, tmp_path):
     lines = lzma.decompress((packed / WORLDS).read_bytes()).decode().splitlines()
     world = json.loads(lines[0])
     world["plan"]["low_actions"][0]["api_action"] = {"action": "OpenObject", "objectId": "Sofa|1"}
     content = "\n".join([json.dumps(world), *lines[1:]]) + "\n"
     (packed / WORLDS).write_bytes(lzma.compress(content.encode()))
     with pytest.raises(DataError, match=rf"{world['traj_id']}: OpenObject is refused"):
-        draw_worlds(packed, tmp_path, simulator)
+        draw_worlds(packed, tmp_path, WorkerSettings())
 
 
 def test_a_run_draws_the_frames_once(packed, run_cli, tmp_path, monkeypatch):
