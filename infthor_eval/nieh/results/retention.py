@@ -17,6 +17,7 @@ import numpy as np
 
 _HALF = 0.5
 _N_RESAMPLES = 2000
+_FEWEST = 20  # questions asked at an age and the one before; of fewer a ratio says nothing
 _ENDS = [0.025, 0.975]  # of 95 % intervals
 
 
@@ -68,10 +69,13 @@ class Ladder:
 
 
 def retention_of(ladders: Sequence[Ladder], seed: int = 0) -> Retention | None:
-    """Return the retention of a reader; None if no question was asked at two ages in a row."""
+    """Return the retention of a reader, up to the age before which too few questions are left.
+
+    It is None if too few were asked at the first two ages.
+    """
     ages = sorted({age for ladder in ladders for age in ladder.net})
     sums = [_sums(ladders, *ages_) for ages_ in pairwise(ages)]
-    reached = next((at for at, it in enumerate(sums) if not it.n), len(sums))
+    reached = next((at for at, it in enumerate(sums) if it.n < _FEWEST), len(sums))
     if not reached:
         return None
     del ages[reached + 1 :], sums[reached:]

@@ -18,6 +18,7 @@ from infthor_eval.generation.twins.drafting import TwinSettings
 from infthor_eval.generation.twins.insertions import Insertion
 from infthor_eval.generation.twins.rungs import farthest_first, ladders, stretches, that_stay
 from infthor_eval.generation.twins.twin_set import make_twins
+from infthor_eval.nieh.results import retention
 from infthor_eval.nieh.scoring import score
 from infthor_eval.thor.launch import embedded_launch
 from infthor_eval.workers import WorkerSettings
@@ -154,7 +155,10 @@ def test_the_last_frames_before_a_moment_are_the_same_in_both_worlds(made):
         assert age in RUNGS
 
 
-def test_every_row_can_be_asked_and_oracle_has_all_pairs_at_every_age(made, run_cli, tmp_path):
+def test_every_row_can_be_asked_and_oracle_has_all_pairs_at_every_age(
+    made, run_cli, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(retention, "_FEWEST", 1)
     out, summary = made
     assert not NiehSet(out).skipped
     run = ("--tasks", "nieh_twins", "--data", out, "--context", "trajectory", "--output", tmp_path)
