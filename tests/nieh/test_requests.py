@@ -60,6 +60,7 @@ def test_every_task_is_among_them():
         "nieh_memory",
         "nieh_memory_frames",
         "nieh_memory_notes",
+        "nieh_mini_long",
         "nieh_mini_memory",
         "nieh_mini_twins",
         "nieh_twins",  # has no set here that it could be asked of

@@ -42,8 +42,8 @@ def whole(file, tmp_path_factory):
 
 @pytest.fixture
 def packed(whole, tmp_path):
-    out = tmp_path / "nieh_small"
-    out.mkdir()
+    out = tmp_path / "sets" / "nieh_mini_twins"
+    out.mkdir(parents=True)
     pack_worlds(whole, out)
     return out
 
@@ -110,15 +110,19 @@ def test_a_world_that_cannot_be_carried_out_is_named(packed, tmp_path):
 
 def test_a_run_draws_the_frames_once(packed, run_cli, tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    for name in ("infthor_eval.nieh.samples", "infthor_eval.cli.progress.undrawn"):
-        monkeypatch.setattr(f"{name}.packaged_folder", lambda _: packed)
+    for module in ("infthor_eval.nieh.samples", "infthor_eval.cli.progress.undrawn"):
+        monkeypatch.setattr(
+            f"{module}.packaged_folder", lambda name: packed if "/" in name else packed.parent
+        )
     assert is_undrawn(packed) and not is_drawn(packed)
     with pytest.raises(UsageError, match="draws them, once"):
-        samples.find_set(bundled="nieh_small")
+        samples.find_set(bundled="nieh_mini_twins")
     run = ("--tasks", "nieh_mini_twins", "--context", "trajectory", "--model", "oracle")
     first = run_cli("run", *run, "--output", tmp_path / "one")
     assert "comes without frames" in read_success(first)[1]
-    assert is_drawn(packed) and samples.find_set(bundled="nieh_small").root == drawn_folder(packed)
+    assert is_drawn(packed) and samples.find_set(bundled="nieh_mini_twins").root == drawn_folder(
+        packed
+    )
     second = run_cli("run", *run, "--output", tmp_path / "two")
     assert "comes without frames" not in read_success(second)[1]
     (file,) = (tmp_path / "two").glob("oracle/*/results.json")
