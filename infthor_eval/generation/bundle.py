@@ -36,7 +36,7 @@ from infthor_eval.generation.settings import TrajectorySettings
 from infthor_eval.generation.twins.drafting import TwinSettings
 from infthor_eval.generation.twins.pairing import ScoreReply
 from infthor_eval.generation.twins.twin_set import TwinSummary, make_twins
-from infthor_eval.generation.twins.undrawn import pack_worlds
+from infthor_eval.generation.twins.undrawn import copy_questions, pack_worlds
 from infthor_eval.storage.digests import digest_of_file, fingerprint
 from infthor_eval.storage.files import remove, write_atomically
 from infthor_eval.thor.launch import embedded_launch
@@ -51,7 +51,6 @@ _WORK = ".building-"  # of the hidden folder; the fingerprint of the manifest fo
 _TRAJECTORIES = "trajectories"
 _REPLAYED = "replayed"
 _SET = "set"
-_SET_INFO = "set.json"
 
 
 class TrajectoryRecipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -293,8 +292,7 @@ def copy_compactly(source: Path, out: Path, colors: int) -> None:
     for group in by_base.values():
         names.update(_copy_worlds(data, group, out, colors))
     write_pairs(out, [_compared(pair, names) for pair in pairs])
-    for file in (_SET_INFO, *(f"{name}.csv" for name in data.files)):
-        shutil.copyfile(source / file, out / file)
+    copy_questions(source, out, data.files)
 
 
 def _copy_worlds(

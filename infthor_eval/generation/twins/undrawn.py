@@ -56,7 +56,7 @@ def pack_worlds(source: Path, out: Path) -> None:
     write_packed(out / WORLDS.removesuffix(".xz"), b"\n".join(lines) + b"\n")
     (out / DIGESTS).write_bytes(msgspec.json.format(msgspec.json.encode(digests), indent=1) + b"\n")
     write_pairs(out, pairs)
-    _copy_rest(source, out, data.files)
+    copy_questions(source, out, data.files)
 
 
 class Drawn(msgspec.Struct):
@@ -65,6 +65,7 @@ class Drawn(msgspec.Struct):
     Attributes:
         differing: names of those that are drawn otherwise here than where the set was made.
         failure: why one cannot be carried out here; empty if all can.
+        is_resumed: False, as no scene is skipped whole.
     """
 
     differing: list[str] = msgspec.field(default_factory=list)
@@ -106,7 +107,7 @@ def draw_worlds(
     for failure in (it.failure for it in drawn if it.failure):
         raise DataError(f"{packed / WORLDS}: {failure}; {_HINT}")
     write_pairs(out, read_pairs(packed))
-    _copy_rest(packed, out, NiehSet(packed).files)  # it says that all is there
+    copy_questions(packed, out, NiehSet(packed).files)  # it says that all is there
     return [name for it in drawn for name in it.differing]
 
 
@@ -155,6 +156,7 @@ def _digest(data: NiehSet, name: str, n_frames: int | None = None) -> str:
     return digest(msgspec.json.encode((steps, pictures)))
 
 
-def _copy_rest(source: Path, out: Path, files: Iterable[str]) -> None:
+def copy_questions(source: Path, out: Path, files: Iterable[str]) -> None:
+    """Copy the files of a set's questions, by their names; last what it says of itself."""
     for file in (*(f"{name}.csv" for name in files), SET_INFO):
         shutil.copyfile(source / file, out / file)
