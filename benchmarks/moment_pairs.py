@@ -1,14 +1,16 @@
 """Pairs of moments: the same words with two answers, and how far time alone tells which is which.
 
-python benchmarks/moment_pairs.py SET [SET ...] [--every 25] [--older 30] [--least 12]
+python benchmarks/moment_pairs.py SET [SET ...] [--mirrored] [--every 25] [--older 30] [--least 12]
 
 Each trajectory of the sets is asked at moments; a pair are two moments at which one question has
 two answers, each wrong at the other moment, its evidence older than so many frames at both. Of
-pairs on the same events one is kept.
+pairs on the same events one is kept. With --mirrored the pairs are those that
+`infthor-eval moments` makes.
 
-A learner is trained on the other scenes. It knows the form, the words and both answers, and no
-frame: which number is larger, which list is longer, which answers come early and late. What it has
-is net pairs, right less exchanged: 0 where time does not tell.
+A learner is trained on the other scenes. It knows the form, the words, both answers and both
+moments, and no frame: which number is larger, which list is longer, which answers come early and
+late, and at which part of a trajectory. What it has is net pairs, right less exchanged: 0 where
+time does not tell.
 """
 
 import argparse
@@ -17,20 +19,23 @@ import random
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import combinations
 from pathlib import Path
 
 import numpy as np
 
 from infthor_eval.formats.step_log import read_steps
+from infthor_eval.generation.moment_pairs import KnownEvents, Ladder, choose, ladders, mirrors
 from infthor_eval.generation.questions.candidates import Candidate
 from infthor_eval.generation.questions.checker import Checker
 from infthor_eval.generation.questions.generate import candidates_of, further_candidates_of
 from infthor_eval.generation.questions.history import DEFAULT_SHARE, TrajectoryHistory
-from infthor_eval.generation.questions.recency import QUESTION_TYPE, recent
+from infthor_eval.generation.questions.recency import QUESTION_TYPE, occurrences, recent
 from infthor_eval.nieh.scoring import score
 
 _STEPS = 200  # of gradient ascent
+_PART = 200  # frames
 
 
 @dataclass(frozen=True)
@@ -65,7 +70,7 @@ def asked_at(folder: Path, every: int) -> Iterator[Asked]:
         candidates = [
             *candidates_of(known, known.all_object_types, rng),
             *further_candidates_of(known, rng),
-            *recent(known),
+            *recent(occurrences(known)),
         ]
         for it in candidates:
             gold = sorted(map(str, it.answers))
@@ -101,6 +106,23 @@ def _are_apart(first: Asked, second: Asked) -> bool:
     return max(overlap) < 1
 
 
+def mirrored(folder: Path, older: int) -> list[Pair]:
+    """Return the pairs of `infthor-eval moments`, at their first rung."""
+    history = TrajectoryHistory("t", read_steps(folder))
+    found = mirrors(
+        ladders(KnownEvents.of_history(history), (older,)), partial(score, scorer="strict")
+    )
+    return [
+        (_asked(first, older), _asked(second, older))
+        for mirror in choose(list(found), len(history))
+        for first, second in mirror.pairs
+    ]
+
+
+def _asked(ladder: Ladder, age: int) -> Asked:
+    return Asked(ladder.candidate, ladder.evidence + age, age)
+
+
 def signs(pair: Pair) -> Counter[str]:
     """Return what tells a pair's order without a frame: positive if the first is the earlier."""
     first, second = pair
@@ -109,6 +131,8 @@ def signs(pair: Pair) -> Counter[str]:
     for asked, sign in ((first, 1), (second, -1)):
         found[f"answer {asked.reply}"] += sign
         found[f"{form} {asked.reply}"] += sign
+        for moment, at in ((first.moment, 1), (second.moment, -1)):
+            found[f"answer {asked.reply} near {moment // _PART}"] += sign * at
     longer = len(first.candidate.answers) - len(second.candidate.answers)
     found["longer"] = found[f"{form} longer"] = int(math.copysign(1, longer)) if longer else 0
     if first.reply.isdigit() and second.reply.isdigit():
@@ -139,6 +163,7 @@ def main() -> None:
     """Print the pairs of each trajectory, and of each form what the learner has."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("sets", type=Path, nargs="+")
+    parser.add_argument("--mirrored", action="store_true")
     parser.add_argument("--every", type=int, default=25)
     parser.add_argument("--older", type=int, default=30)
     parser.add_argument("--least", type=int, default=12, help="pairs of a form that is listed")
@@ -146,8 +171,11 @@ def main() -> None:
     found: dict[str, list[Pair]] = {}
     for root in arguments.sets:
         for folder in sorted((root / "metadata").iterdir()):
-            asked = list(asked_at(folder, arguments.every))
-            pairs = found[folder.name] = pairs_of(asked, arguments.older)
+            if arguments.mirrored:
+                pairs = mirrored(folder, arguments.older)
+            else:
+                pairs = pairs_of(list(asked_at(folder, arguments.every)), arguments.older)
+            found[folder.name] = pairs
             back = sum(pair[0].candidate.question_type == QUESTION_TYPE for pair in pairs)
             print(f"{folder.name}: {len(pairs)} pairs, {back} by counting back", flush=True)
     net: dict[str, list[int]] = defaultdict(list)

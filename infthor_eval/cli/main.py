@@ -56,6 +56,7 @@ _COMMANDS = {
         "look-around": "Level the camera in the long walks of trajectories.",
         "replay": "Replay trajectories into frames and metadata.",
         "questions": "Generate NIEH questions on replayed trajectories.",
+        "moments": "Pair moments: the same question with two answers.",
         "twins": "Make twins: the same episode with one thing changed.",
         "validate": "Keep the questions that one of several models answers.",
         "bundle": "Build a question set from a manifest.",
@@ -78,6 +79,7 @@ _COMMANDS = {
 _FOLDERS = {"Make data": "data."}
 _SHARED_MODULES = {
     "questions": "data.questions:questions",
+    "moments": "data.questions:moments",
     "twins": "data.questions:twins",
     "export": "exchange:export",
     "import-replies": "exchange:import_replies",

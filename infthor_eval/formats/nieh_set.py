@@ -34,7 +34,7 @@ from infthor_eval.formats.reading import first_duplicate, read_json
 from infthor_eval.formats.set_info import simulator_of
 from infthor_eval.formats.shared_frames import read_shared_frames
 from infthor_eval.formats.step_log import Step, log_file, read_steps
-from infthor_eval.formats.twins import TwinPair, read_pairs
+from infthor_eval.formats.twins import TwinPair, has_pairs, read_pairs
 
 T = TypeVar("T")
 K = TypeVar("K")
@@ -144,11 +144,16 @@ class NiehSet:
 
     @cached_property
     def twins(self) -> Mapping[str, TwinPair]:
-        """Pairs of worlds by the names of both trajectories.
+        """Pairs of worlds by the names of both trajectories; none of a set of pairs of moments.
 
         Raises:
-            DataError: `twins.jsonl` is missing or malformed.
+            DataError: `twins.jsonl` is malformed, or missing where two trajectories are a pair.
         """
+        have_worlds = any(map(_have_worlds, self.files.values()))
+        return self._worlds if have_worlds or has_pairs(self.directory) else {}
+
+    @cached_property
+    def _worlds(self) -> Mapping[str, TwinPair]:
         pairs = read_pairs(self.directory)
         return {name: pair for pair in pairs for name in pair.traj_ids}
 
@@ -161,7 +166,7 @@ class NiehSet:
         digest = hashlib.blake2b(digest_size=16)
         for file in self.question_files:
             digest.update(file.read_bytes())
-        if any(question.pair for question in self.questions):  # the pair tells a question's cluster
+        if _have_pairs(self.questions) and self.twins:  # the pair tells a question's cluster
             digest.update(msgspec.json.encode(self.twins))
         for traj_id in sorted({question.traj_id for question in self.questions if self.has_frames}):
             if self._own is None:  # one's own frames have no log
@@ -173,8 +178,8 @@ class NiehSet:
     def _read_file(self, file: Path) -> tuple[Question | SkippedQuestion, ...]:
         name = file.stem if len(self.question_files) > 1 else ""
         rows = read_questions(file) if self._own is None else self._own.read_questions()
-        are_twins = any(isinstance(row, Question) and row.pair for row in rows)
-        bases = self._bases if are_twins else {}
+        are_twins = has_pairs(self.directory) or _have_worlds(rows)
+        bases = self._bases if are_twins and _have_pairs(rows) else {}
         return tuple(
             row
             if isinstance(row, SkippedQuestion)
@@ -184,7 +189,7 @@ class NiehSet:
 
     @cached_property
     def _bases(self) -> Mapping[str, str]:
-        return {name: pair.base for name, pair in self.twins.items()}
+        return {name: pair.base for name, pair in self._worlds.items()}
 
     def reasons(self) -> Counter[str]:
         """Return the number of skipped questions by reason."""
@@ -206,13 +211,16 @@ class NiehSet:
             self._all_frames, traj_id, lambda: tuple(self._trajectory(traj_id).values())
         )
 
+    def frame_numbers(self, traj_id: str) -> list[int]:
+        """Return the numbers (`img_idx`) of a trajectory's frames in time order."""
+        return list(self._trajectory(traj_id))
+
     def frames_until(self, question: Question) -> tuple[FrameRef, ...]:
         """Return the frames of a question's trajectory up to its moment, in time order."""
         frames = self.frames(question.traj_id)
         if question.moment is None:
             return frames
-        numbers = list(self._trajectory(question.traj_id))
-        return frames[: bisect_right(numbers, question.moment)]
+        return frames[: bisect_right(self.frame_numbers(question.traj_id), question.moment)]
 
     def find_places(self, traj_id: str, frames: Sequence[FrameRef]) -> list[int]:
         """Return where in a trajectory's time order frames in time order are; none where one of
@@ -449,6 +457,17 @@ def _read_action_log(path: Path, positions: Mapping[str, int]) -> dict[int, tupl
         return _by_action(
             (image.low_idx, positions[Path(image.image_name).stem]) for image in log.images
         )
+
+
+def _have_pairs(rows: Iterable[Question | SkippedQuestion]) -> bool:
+    return any(isinstance(row, Question) and row.pair for row in rows)
+
+
+def _have_worlds(rows: Iterable[Question | SkippedQuestion]) -> bool:
+    """Return True if both questions of a pair are on trajectories of their own."""
+    paired = [row for row in rows if isinstance(row, Question) and row.pair]
+    first = {row.pair: row.traj_id for row in paired}
+    return any(first[row.pair] != row.traj_id for row in paired)
 
 
 def _logged_action_frames(steps: Sequence[Step]) -> dict[int, tuple[int, ...]] | None:

@@ -8,6 +8,7 @@ from pathlib import Path
 import msgspec
 
 from infthor_eval.errors import DataError, wrap_errors
+from infthor_eval.formats.object_ids import object_type_of
 from infthor_eval.formats.reading import NOT_JSON, read_bytes
 
 _SUFFIXES = (".json", ".txt")  # both hold JSON; the published scripts accept either
@@ -21,8 +22,16 @@ class _Call(msgspec.Struct):
     @property
     def words(self) -> str:
         """The action with its object types: "PutObject Mug Fridge"."""
-        ids = [object_id for object_id in (self.object_id, self.receptacle_id) if object_id]
-        return " ".join([self.action, *(object_id.partition("|")[0] for object_id in ids)])
+        return " ".join([self.action, *(object_id.partition("|")[0] for object_id in self._ids)])
+
+    @property
+    def object_types(self) -> list[str]:
+        """Types of its objects; a slice has one of its own."""
+        return list(map(object_type_of, self._ids))
+
+    @property
+    def _ids(self) -> list[str]:
+        return [object_id for object_id in (self.object_id, self.receptacle_id) if object_id]
 
 
 class _LowAction(msgspec.Struct):
@@ -81,6 +90,12 @@ class Outline(msgspec.Struct):
     def actions(self) -> list[str]:
         """Every low-level action in words."""
         return [action.api_action.words for action in self.plan.low_actions]
+
+    @property
+    def interactions(self) -> list[tuple[str, list[str]]]:
+        """Name and object types of every low-level action."""
+        calls = [action.api_action for action in self.plan.low_actions]
+        return [(call.action, call.object_types) for call in calls]
 
     @property
     def tasks(self) -> list[tuple[str, range]]:

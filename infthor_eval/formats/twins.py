@@ -134,6 +134,11 @@ class TwinWorld(msgspec.Struct, frozen=True):
     places: tuple[TwinPlace, TwinPlace]
 
 
+def has_pairs(folder: Path) -> bool:
+    """Return True if a set has a file of pairs of worlds."""
+    return (folder / _TWINS).is_file()
+
+
 def read_pairs(folder: Path) -> list[TwinPair]:
     """Read the pairs of a set."""
     path = folder / _TWINS

@@ -1,7 +1,12 @@
-"""Questions of twins in a set: what each is paired with, and how old their evidence is."""
+"""Paired questions in a set: what each is paired with, and how old their evidence is.
+
+The other question of a pair is about the twin world, or about another moment of the same one.
+"""
 
 from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
+
+from msgspec.structs import replace
 
 from infthor_eval.errors import DataError
 from infthor_eval.formats.nieh_set import NiehSet
@@ -11,11 +16,20 @@ from infthor_eval.nieh.records import TwinSide
 from infthor_eval.nieh.samples import TaskSamples
 from infthor_eval.storage.digests import seed_of
 
+MOMENT = "moment"  # kind of pairs that need no second world
+
 
 def first_world(traj_ids: Iterable[str]) -> str:
     """Return which of the trajectories of a pair of worlds is asked about first, drawn by both."""
     ordered = sorted(traj_ids)
     return ordered[seed_of("\n".join(ordered)) % len(ordered)]
+
+
+def is_first(question: Question, other: Question) -> bool:
+    """Return True for one question of a pair, drawn by both."""
+    if question.traj_id != other.traj_id:
+        return question.traj_id == first_world((question.traj_id, other.traj_id))
+    return question.id == first_world((question.id, other.id))
 
 
 def twin_side(task_samples: TaskSamples, sample: QuestionVariant) -> TwinSide | None:
@@ -42,36 +56,49 @@ def twin_of_reply(
 def _side(
     data: NiehSet, question: Question, shown: Sequence[int] | None, true: Sequence[int] | None
 ) -> TwinSide:
+    other = paired_with(data, question)
+    clues = data.clue_positions(question) if data.has_frames else question.clues
+    n_after_clues = None
+    if shown is not None and true is not None:
+        n_after_clues = sum(position > max(clues) for position in shown)
+    side = TwinSide(
+        pair=question.pair,
+        fact=question.fact,
+        kind=MOMENT,
+        traj_id=question.traj_id,
+        answers=other.answers,
+        n_frames=None if shown is None else len(shown),
+        n_differing=None,
+        n_after_clues=n_after_clues,
+    )
+    if other.traj_id == question.traj_id and question.moment is not None:
+        return _until(side, question.moment, max(clues), min(clues))
     pair = data.twins.get(question.traj_id)
     if pair is None:
         raise DataError(
             f"{data.root}: twins.jsonl has no pair with {question.traj_id}; make the twins again"
         )
-    clues = data.clue_positions(question) if data.has_frames else question.clues
-    n_differing = n_after_clues = None
+    n_differing = None
     if shown is not None and true is not None:
         n_differing = sum(not pair.frames[at].same for at in true if at < len(pair.frames))
-        n_after_clues = sum(position > max(clues) for position in shown)
     last = len(pair.frames) - 1 if question.moment is None else question.moment
-    evidence = pair.evidence(last)
-    return TwinSide(
-        pair=question.pair,
-        fact=question.fact,
-        kind=pair.kind,
-        traj_id=question.traj_id,
-        answers=_other(data, question).answers,
-        n_frames=None if shown is None else len(shown),
-        n_differing=n_differing,
-        n_after_clues=n_after_clues,
+    side = replace(side, kind=pair.kind, n_differing=n_differing)
+    return _until(side, last, pair.evidence(last), min(clues))
+
+
+def _until(side: TwinSide, last: int, evidence: int | None, oldest: int) -> TwinSide:
+    """Return a side with its distances from the frame at which it is asked."""
+    return replace(
+        side,
         age=None if evidence is None else last - evidence,
-        span=max(0, last - min(clues)),
+        span=max(0, last - oldest),
         length=last + 1,
     )
 
 
-def _other(data: NiehSet, question: Question) -> Question:
-    """Return the question of the same pair in the other world."""
-    others = [it for it in _by_pair(data)[question.pair] if it.traj_id != question.traj_id]
+def paired_with(data: NiehSet, question: Question) -> Question:
+    """Return the other question of a pair."""
+    others = [it for it in _by_pair(data)[question.pair] if it.id != question.id]
     if len(others) != 1:
         raise DataError(
             f"{data.root}: {len(others)} questions are paired with {question.id} as "

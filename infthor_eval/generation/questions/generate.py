@@ -33,7 +33,6 @@ from infthor_eval.generation.questions.rooms import rooms_of
 from infthor_eval.workers import WorkerSettings, run_jobs
 
 _ONE_PROCESS = WorkerSettings()
-# Errors of a log that has the documented form but inconsistent content.
 _INCONSISTENT = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError)
 _YES_NO = ("yes", "no")
 _NEXT_NUMBERS = 6
@@ -174,7 +173,7 @@ def _object_types(
 ) -> dict[Path, frozenset[str]]:
     """Return the object types of each trajectory; those that cannot be read are skipped."""
     types: dict[Path, frozenset[str]] = {}
-    folders = _trajectory_folders(folder)
+    folders = trajectory_folders(folder)
     advance = begin("trajectories read", len(folders))
     for path in folders:
         advance()
@@ -243,7 +242,7 @@ class _QuestionWorker:
 
     def do(self, job: _RuleJob | _CheckJob) -> Iterator[Any]:
         try:
-            with _naming_inconsistency(job.asked.path):
+            with naming_inconsistency(job.asked.path):
                 result: Any = job.run()
         except DataError as error:  # of this trajectory alone
             yield error
@@ -274,18 +273,20 @@ def _share_out(
 
 
 def _read_history(path: Path, share: float, moment: int | None = None) -> TrajectoryHistory:
-    with _naming_inconsistency(path):
+    with naming_inconsistency(path):
         steps = read_steps(path)
         return TrajectoryHistory(path.name, steps if moment is None else steps[: moment + 1], share)
 
 
-def _naming_inconsistency(path: Path) -> AbstractContextManager[None]:
+def naming_inconsistency(path: Path) -> AbstractContextManager[None]:
+    """Turn errors of a log that has the documented form but inconsistent content into ours."""
     return wrap_errors(
         f"{path}: its log is inconsistent", "replay the trajectory again", catch=_INCONSISTENT
     )
 
 
-def _trajectory_folders(folder: Path) -> list[Path]:
+def trajectory_folders(folder: Path) -> list[Path]:
+    """Return the folders of a set's trajectories, sorted; none is an error."""
     metadata = folder / "metadata"
     folders: list[Path] = []
     if metadata.is_dir():

@@ -3,8 +3,11 @@
 Their answers change with each such event, and need not grow.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
+from infthor_eval.formats.outline import Outline
+from infthor_eval.formats.step_log import ObjectLog
 from infthor_eval.generation.questions.candidates import Candidate, further_type, type_question
 from infthor_eval.generation.questions.history import TrajectoryHistory
 
@@ -12,34 +15,91 @@ QUESTION_TYPE = further_type("recency")
 ORDINALS = ("last", "second to last", "third to last", "fourth to last", "fifth to last")
 
 
-def recent(history: TrajectoryHistory) -> Iterator[Candidate]:
-    """Yield the questions whose clues show all events from the one asked about to the moment.
+@dataclass(frozen=True)
+class Occurrence:
+    """An object was put down or opened.
 
-    The first two clues are of the event asked about.
+    Attributes:
+        frame: frame after it.
+        object_type: type of the object.
+        place: type of what it was put into or onto; None for an opening.
+        is_shown: True if that frame and the one before show it.
     """
-    puts = [
-        (move.object_type, history.target_type(move), history.put_clues(move))
+
+    frame: int
+    object_type: str
+    place: str | None
+    is_shown: bool
+
+
+def occurrences(history: TrajectoryHistory) -> list[Occurrence]:
+    """Return what was put down and opened, in the order of time."""
+    puts = (
+        Occurrence(
+            move.after,
+            move.object_type,
+            history.target_type(move),
+            history.put_clues(move) is not None,
+        )
         for move in history.moves
-    ]
-    opened = [
-        (event.object_type, history.opening_clues(event))
+    )
+    opened = (
+        Occurrence(event.frame, event.object_type, None, history.opening_clues(event) is not None)
         for event in history.events
         if event.action == "OpenObject"
-    ]
-    things = [(name, clues) for name, _, clues in puts]
-    places = [(place, clues) for _, place, clues in puts]
-    yield from _backwards("What did you put down {}?", things)
-    yield from _backwards("Where did you put the object that you put down {}?", places)
-    yield from _backwards("What did you open {}?", opened)
+    )
+    return sorted((*puts, *opened), key=lambda event: event.frame)
+
+
+def logged_occurrences(
+    outline: Outline, frames: Mapping[int, Sequence[int]], logs: Sequence[ObjectLog]
+) -> Iterator[Occurrence]:
+    """Yield what was put down and opened, by a published log, which names types alone.
+
+    Two frames show a put if the object is in the hand in the first, and where it was put is in view
+    in the second; an opening, if it is in view in the first, and open in the second.
+
+    Args:
+        outline: the trajectory.
+        frames: positions of the frames of each low-level action that has any.
+        logs: the published fields of each frame.
+    """
+    at = 1
+    for number, (action, types) in enumerate(outline.interactions):
+        at = max(at, *frames.get(number, ()))
+        is_logged = number in frames
+        before, after = (logs[at - 1], logs[at]) if is_logged else (ObjectLog(), ObjectLog())
+        match action, types:
+            case "PutObject", [name, place]:
+                is_shown = name in before.inven_obj and place in after.visible
+                yield Occurrence(at, name, place, is_shown)
+            case "OpenObject", [name]:
+                is_shown = name in before.visible and name in after.is_open
+                yield Occurrence(at, name, None, is_shown)
+
+
+def recent(events: Iterable[Occurrence]) -> Iterator[Candidate]:
+    """Yield the questions whose clues show all events from the one asked about to the moment.
+
+    Args:
+        events: what has happened by then, in the order of time.
+    """
+    puts, opened = [], []
+    for event in events:
+        (opened if event.place is None else puts).append(event)
+    yield from _backwards("What did you put down {}?", puts, [it.object_type for it in puts])
+    where = "Where did you put the object that you put down {}?"
+    yield from _backwards(where, puts, [it.place or "" for it in puts])
+    yield from _backwards("What did you open {}?", opened, [it.object_type for it in opened])
 
 
 def _backwards(
-    form: str, events: Sequence[tuple[str, tuple[int, int] | None]]
+    form: str, events: Sequence[Occurrence], answers: Sequence[str]
 ) -> Iterator[Candidate]:
     """Yield a form about the last events, as far back as frames show each of them."""
     clues: tuple[int, ...] = ()
-    for ordinal, (name, shown) in zip(ORDINALS, reversed(events), strict=False):
-        if shown is None:
+    for ordinal, event, answer in zip(ORDINALS, reversed(events), reversed(answers), strict=False):
+        if not event.is_shown:
             return
-        clues = (*shown, *clues)
-        yield from type_question(QUESTION_TYPE, form, (ordinal,), clues, [name])
+        clues = (event.frame - 1, event.frame, *clues)
+        yield from type_question(QUESTION_TYPE, form, (ordinal,), clues, [answer])

@@ -8,7 +8,7 @@ To add a baseline of NIEH: a class in `BASELINES` here, and its name in `infthor
 
 import random
 from collections import Counter, defaultdict
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol, runtime_checkable
 
 from infthor_eval.formats.frames import FrameRef
@@ -20,7 +20,7 @@ from infthor_eval.nieh.docs import doc_target
 from infthor_eval.nieh.guessing.blind import find_blind, sample_on_clues, visible_knowledge
 from infthor_eval.nieh.guessing.chains import question_type
 from infthor_eval.nieh.guessing.folds import held_out
-from infthor_eval.nieh.twins import first_world
+from infthor_eval.nieh.twins import is_first, paired_with
 from infthor_eval.runs.suite import BaselineSubject
 from infthor_eval.storage.digests import seed_of
 from model_adapters import Subject
@@ -96,20 +96,16 @@ class _OneOfTwo(BaselineSubject):
     def fit(self, data: NiehSet, context: str) -> Predict:
         """See `Baseline`."""
         counts_for = _answers_elsewhere(data)
-        worlds: dict[str, set[str]] = defaultdict(set)
-        for question in data.questions:
-            worlds[question.pair].add(question.traj_id)
 
         def predict(sample: QuestionVariant, shown: Sequence[ContextPart] = ()) -> str:
             counts = counts_for(sample)
             two = sorted(counts, key=lambda text: (-counts[text], text))[:2] or [""]
-            pair = sample.question.pair
-            return two[-1 if self._takes_second(sample.question, shown, worlds[pair]) else 0]
+            return two[-1 if self._takes_second(sample.question, shown, data) else 0]
 
         return predict
 
     def _takes_second(
-        self, question: Question, shown: Sequence[ContextPart], worlds: Collection[str]
+        self, question: Question, shown: Sequence[ContextPart], data: NiehSet
     ) -> bool:
         raise NotImplementedError
 
@@ -120,9 +116,9 @@ class Flip(_OneOfTwo):
     name = "flip"
 
     def _takes_second(
-        self, question: Question, shown: Sequence[ContextPart], worlds: Collection[str]
+        self, question: Question, shown: Sequence[ContextPart], data: NiehSet
     ) -> bool:
-        return bool(question.pair) and question.traj_id != first_world(worlds)
+        return bool(question.pair) and not is_first(question, paired_with(data, question))
 
 
 class Hash(_OneOfTwo):
@@ -131,7 +127,7 @@ class Hash(_OneOfTwo):
     name = "hash"
 
     def _takes_second(
-        self, question: Question, shown: Sequence[ContextPart], worlds: Collection[str]
+        self, question: Question, shown: Sequence[ContextPart], data: NiehSet
     ) -> bool:
         frames = [part.digest for part in as_images(shown) if isinstance(part, FrameRef)]
         return bool(seed_of("\n".join([question.text, *frames])) % 2)

@@ -8,7 +8,7 @@ from infthor_eval.formats.step_log import read_steps
 from infthor_eval.generation.questions.checker import Checker
 from infthor_eval.generation.questions.generate import candidates_of, further_candidates_of
 from infthor_eval.generation.questions.history import DEFAULT_SHARE, TrajectoryHistory
-from infthor_eval.generation.questions.recency import recent
+from infthor_eval.generation.questions.recency import occurrences, recent
 
 from ...helpers.bundled import BUNDLED, bundled_name
 
@@ -36,5 +36,5 @@ def asked(history):
     return [
         *candidates_of(history, types, rng),
         *further_candidates_of(history, rng),
-        *recent(history),
+        *recent(occurrences(history)),
     ]

@@ -5,7 +5,7 @@ import pytest
 from infthor_eval.formats.step_log import ObjectInFrame
 from infthor_eval.generation.questions.checker import Checker
 from infthor_eval.generation.questions.history import DEFAULT_SHARE
-from infthor_eval.generation.questions.recency import ORDINALS, recent
+from infthor_eval.generation.questions.recency import ORDINALS, occurrences, recent
 
 from .logs import history, moved, state
 
@@ -37,7 +37,7 @@ def made():
 
 
 def answers(log):
-    return {it.text: (it.answers, it.clues) for it in recent(log)}
+    return {it.text: (it.answers, it.clues) for it in recent(occurrences(log))}
 
 
 def test_events_count_back_from_the_moment():

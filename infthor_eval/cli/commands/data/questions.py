@@ -1,4 +1,4 @@
-"""`infthor-eval questions` and `infthor-eval twins`: make questions, on a set or on twins."""
+"""`infthor-eval questions`, `moments` and `twins`: make questions, pairs of moments, or twins."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ from infthor_eval.cli.options.workers import parse_worker_settings, worker_optio
 from infthor_eval.errors import UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Mapping, Sequence
 
     from rich.console import Console
 
+    from infthor_eval.formats.question import Question
     from infthor_eval.generation.twins.twin_set import FinalTaskSummary, TwinSummary
 
 
@@ -82,10 +83,8 @@ def questions(
     Exit code 1 if a trajectory of the set cannot be read.
     """
     from infthor_eval.cli.progress.bar import PacedBar
-    from infthor_eval.errors import wrap_errors
-    from infthor_eval.formats.qa_csv import encode_questions
     from infthor_eval.generation.questions.generate import generate_questions
-    from infthor_eval.storage.files import prepare_file, refuse_overwrite, write_atomically
+    from infthor_eval.storage.files import prepare_file
     from infthor_eval.terminal import error_console, print_line, progress_bar
 
     worker_settings = parse_worker_settings(**workers)
@@ -104,14 +103,7 @@ def questions(
             notify=notes.print,
             begin=lambda part, n: PacedBar(progress, part, n).advance,
         )
-    content = encode_questions(result.questions)
-    if not overwrite:
-        refuse_overwrite(out, content)
-    with (
-        wrap_errors(f"{out}: cannot be written", "give another --out"),
-        write_atomically(out) as partial,
-    ):
-        partial.write_bytes(content)
+    _write(out, result.questions, overwrite)
     print_line(f"{len(result.questions)} questions on {result.trajectories} trajectories: {out}")
     print_line(result.summary_text())
     for question in result.unconfirmed:
@@ -119,6 +111,94 @@ def questions(
     for line in result.skipped:
         notes.print(f"skipped: {line}", style="red")
     context.exit(1 if result.skipped else 0)
+
+
+@click.command(
+    "moments", cls=ExampleCommand, example="infthor-eval moments SET --out SET/qa_set_moments.csv"
+)
+@click.argument("folder", metavar="SET", type=PATH)
+@click.option("--out", required=True, type=PATH, help="CSV file to write.")
+@click.option(
+    "--trajectories", type=PATH, help="Folder of the trajectories, if they are not in the set."
+)
+@click.option(
+    "--per-trajectory",
+    type=click.IntRange(2),
+    default=25,
+    show_default=True,
+    help="Pairs of one trajectory, at most; they come by two.",
+)
+@click.option(
+    "--rungs",
+    metavar="FRAMES,...",
+    default="10,30,100,300",
+    show_default=True,
+    help="Ask so many frames after the evidence, at both moments.",
+)
+@click.option("--overwrite", is_flag=True, help="Replace a file that holds other questions.")
+@click.pass_context
+def moments(
+    context: click.Context,
+    folder: Path,
+    out: Path,
+    trajectories: Path | None,
+    per_trajectory: int,
+    rungs: str,
+    overwrite: bool,
+) -> None:
+    """Pair moments of a SET: the same question at two of them has two answers.
+
+    No second world is needed, and which moment is the later one tells nothing. Exit code 1 if a
+    trajectory of the set cannot be read.
+    """
+    from functools import partial
+
+    from infthor_eval.cli.progress.bar import PacedBar
+    from infthor_eval.generation.moment_pairs import pair_moments
+    from infthor_eval.generation.questions.generate import trajectory_folders
+    from infthor_eval.nieh.scoring import score
+    from infthor_eval.storage.files import prepare_file
+    from infthor_eval.terminal import console, error_console, progress_bar
+
+    ages = _parse_rungs(rungs)
+    if not ages:
+        raise UsageError("--rungs: give numbers of frames above 0, as in 10,30,100")
+    prepare_file(out)
+    notes = error_console()
+    with progress_bar(notes) as progress:
+        result = pair_moments(
+            folder,
+            ages,
+            per_trajectory,
+            partial(score, scorer="strict"),
+            trajectories,
+            PacedBar(progress, "moments paired", len(trajectory_folders(folder))).advance,
+        )
+    _write(out, result.questions, overwrite)
+    n_pairs, n_trajectories = result.by_form.total(), result.trajectories
+    output = console()
+    output.print(f"{n_pairs} pairs of moments on {n_trajectories} trajectories: {out}")
+    _print_counts("by form", result.by_form, output)
+    _print_counts("by frames since the evidence", result.by_age, output)
+    for line in result.skipped:
+        notes.print(f"skipped: {line}", style="red")
+    context.exit(1 if result.skipped else 0)
+
+
+def _write(out: Path, questions: Sequence[Question], overwrite: bool) -> None:
+    """Write a question file, and refuse to replace one that holds other questions."""
+    from infthor_eval.errors import wrap_errors
+    from infthor_eval.formats.qa_csv import encode_questions
+    from infthor_eval.storage.files import refuse_overwrite, write_atomically
+
+    content = encode_questions(questions)
+    if not overwrite:
+        refuse_overwrite(out, content)
+    with (
+        wrap_errors(f"{out}: cannot be written", "give another --out"),
+        write_atomically(out) as partial,
+    ):
+        partial.write_bytes(content)
 
 
 @click.command("twins", cls=ExampleCommand, example="infthor-eval twins trajectories --out TWINS")
@@ -276,6 +356,9 @@ def _print(summary: TwinSummary | FinalTaskSummary, output: Console) -> None:
         f"{found}, {summary.seconds} s"
     )
     for title, counts in (*tables, ("rejected", summary.rejected)):
-        if not counts:
-            continue
+        _print_counts(title, counts, output)
+
+
+def _print_counts(title: str, counts: Mapping[Any, int], output: Console) -> None:
+    if counts:
         output.print(f"{title}: {', '.join(f'{name} {count}' for name, count in counts.items())}")
