@@ -76,7 +76,8 @@ class Mirror:
     @property
     def pairs(self) -> tuple[Couple, Couple]:
         """Both pairs: the answer that is right early in one is right late in the other."""
-        late = self.late if self.late[0].reply != self.early[0].reply else self.late[::-1]
+        is_mirrored = self.late[0].reply != self.early[0].reply
+        late = self.late if is_mirrored else self.late[::-1]
         return (self.early[0], late[0]), (self.early[1], late[1])
 
     @property

@@ -138,7 +138,7 @@ def test_what_is_chosen_is_balanced_and_asks_nothing_twice(found, most):
 
 
 def test_the_pairs_are_a_task(folder, run_cli, tmp_path):
-    file = folder / "qa_set_moments.csv"
+    file = folder / "moments.csv"
     words = ("moments", folder, "--out", file, "--rungs", "1,2,3,5,10")
     printed, _ = read_success(run_cli(*words))
     assert " pairs of moments on 6 trajectories" in printed
@@ -159,7 +159,7 @@ def test_the_pairs_are_a_task(folder, run_cli, tmp_path):
 
 
 def test_rungs_are_numbers_of_frames(folder, run_cli):
-    words = ("moments", folder, "--out", folder / "qa_set_moments.csv", "--rungs")
+    words = ("moments", folder, "--out", folder / "moments.csv", "--rungs")
     for rungs in ("", "0", "soon"):
         assert_refused(run_cli(*words, rungs), "give numbers of frames above 0")
 
@@ -171,7 +171,7 @@ def test_a_trajectory_that_cannot_be_read_is_named_and_the_others_are_paired(tmp
         (metadata / path.name).symlink_to(path)
     (metadata / "spoiled").mkdir()
     (metadata / "spoiled" / "metadata.json").write_text("[{")
-    out = tmp_path / "set" / "qa_set_moments.csv"
+    out = tmp_path / "set" / "moments.csv"
     code, printed, notes = run_cli("moments", tmp_path / "set", "--out", out, "--rungs", "1,2")
     assert code == 1 and "on 6 trajectories" in printed and "spoiled" in notes
 
@@ -206,7 +206,7 @@ def test_published_logs_do_with_their_trajectories(published):
 
 
 def test_what_a_log_must_say_is_said(published, run_cli):
-    words = ("moments", published, "--out", published / "qa_set_moments.csv")
+    words = ("moments", published, "--out", published / "moments.csv")
     code, _, notes = run_cli(*words)
     assert code == 1 and notes.count("the trajectory's JSON is not in metadata/") == 6
     for path in published.glob("metadata/*/metadata.json"):

@@ -67,15 +67,15 @@ def logged_occurrences(
     at = 1
     for number, (action, types) in enumerate(outline.interactions):
         at = max(at, *frames.get(number, ()))
-        is_logged = number in frames
-        before, after = (logs[at - 1], logs[at]) if is_logged else (ObjectLog(), ObjectLog())
+        before = logs[at - 1]
+        after = logs[at]
         match action, types:
             case "PutObject", [name, place]:
                 is_shown = name in before.inven_obj and place in after.visible
-                yield Occurrence(at, name, place, is_shown)
+                yield Occurrence(at, name, place, is_shown and number in frames)
             case "OpenObject", [name]:
                 is_shown = name in before.visible and name in after.is_open
-                yield Occurrence(at, name, None, is_shown)
+                yield Occurrence(at, name, None, is_shown and number in frames)
 
 
 def recent(events: Iterable[Occurrence]) -> Iterator[Candidate]:
@@ -84,9 +84,9 @@ def recent(events: Iterable[Occurrence]) -> Iterator[Candidate]:
     Args:
         events: what has happened by then, in the order of time.
     """
-    puts, opened = [], []
-    for event in events:
-        (opened if event.place is None else puts).append(event)
+    happened = list(events)
+    opened = [event for event in happened if event.place is None]
+    puts = [event for event in happened if event.place is not None]
     yield from _backwards("What did you put down {}?", puts, [it.object_type for it in puts])
     where = "Where did you put the object that you put down {}?"
     yield from _backwards(where, puts, [it.place or "" for it in puts])

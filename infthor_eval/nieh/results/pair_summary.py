@@ -177,7 +177,7 @@ def _ladders(pairs: Pairs[Side]) -> list[Ladder]:
     for pair in pairs.pairs:
         record, twin = pair[0]
         if twin.age is not None:
-            evidence = frozenset(side.twin.length - side.twin.age for side in pair)
+            evidence = frozenset((side.twin.length or 0) - (side.twin.age or 0) for side in pair)
             name = (record.cluster, twin.fact, record.payload.question, record.variant, evidence)
             scores.setdefault(name, {}).setdefault(twin.age, []).append(pairs.shares(pair))
     return [Ladder(str(name[0]), _net_by_age(by_age)) for name, by_age in scores.items()]

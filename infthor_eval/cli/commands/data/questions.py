@@ -114,7 +114,7 @@ def questions(
 
 
 @click.command(
-    "moments", cls=ExampleCommand, example="infthor-eval moments SET --out SET/qa_set_moments.csv"
+    "moments", cls=ExampleCommand, example="infthor-eval moments SET --out SET/moments.csv"
 )
 @click.argument("folder", metavar="SET", type=PATH)
 @click.option("--out", required=True, type=PATH, help="CSV file to write.")
@@ -175,9 +175,9 @@ def moments(
             PacedBar(progress, "moments paired", len(trajectory_folders(folder))).advance,
         )
     _write(out, result.questions, overwrite)
-    n_pairs, n_trajectories = result.by_form.total(), result.trajectories
     output = console()
-    output.print(f"{n_pairs} pairs of moments on {n_trajectories} trajectories: {out}")
+    n_pairs = result.by_form.total()
+    output.print(f"{n_pairs} pairs of moments on {result.trajectories} trajectories: {out}")
     _print_counts("by form", result.by_form, output)
     _print_counts("by frames since the evidence", result.by_age, output)
     for line in result.skipped:
