@@ -256,7 +256,7 @@ def mirrors(found: Iterable[Ladder], score: ScoreReply) -> Iterator[Mirror]:
     for group in by_text.values():
         couples: dict[frozenset[str], list[Couple]] = {}
         for couple in combinations(group, 2):
-            if _are_apart(*couple, score):
+            if _differ(*couple, score):
                 answers = frozenset(ladder.reply for ladder in couple)
                 couples.setdefault(answers, []).append(couple)
         for those in couples.values():
@@ -268,7 +268,7 @@ def mirrors(found: Iterable[Ladder], score: ScoreReply) -> Iterator[Mirror]:
 
 
 def choose(found: list[Mirror], most: int) -> list[Mirror]:
-    """Choose mirrors that share no question, with forms in balance.
+    """Choose mirrors of which none tells the answers of another, with forms in balance.
 
     Those that reach farthest come first; of these, those whose moments are closest to each other.
     """
@@ -283,7 +283,7 @@ def choose(found: list[Mirror], most: int) -> list[Mirror]:
         best = min(found, key=rank)
         chosen.append(best)
         counts[best.candidate.form] += 1
-        found = list(filter(partial(_are_disjoint, best), found))
+        found = list(filter(partial(_are_apart, best), found))
     return chosen
 
 
@@ -297,11 +297,23 @@ def _questions(mirror: Mirror) -> list[tuple[str, int]]:
     return [(ladder.candidate.text, ladder.evidence) for ladder in mirror.ladders]
 
 
-def _are_disjoint(one: Mirror, other: Mirror) -> bool:
+def _are_apart(one: Mirror, other: Mirror) -> bool:
+    """Return True if two mirrors share no question, and no event unless the answers are the same.
+
+    If the same thing is the cabinet or the fridge by one and the cabinet or the drawer by the
+    other, it is the cabinet.
+    """
+    if one.fact != other.fact and not _events(one).isdisjoint(_events(other)):
+        return False
     return set(_questions(one)).isdisjoint(_questions(other))
 
 
-def _are_apart(first: Ladder, second: Ladder, score: ScoreReply) -> bool:
+def _events(mirror: Mirror) -> set[tuple[str, int]]:
+    """Return what tells the events that are asked about: of each, the first clues are."""
+    return {(ladder.candidate.form, ladder.candidate.clues[0]) for ladder in mirror.ladders}
+
+
+def _differ(first: Ladder, second: Ladder, score: ScoreReply) -> bool:
     """Return True if each answer is wrong at the other moment."""
     overlap = (
         score(first.reply, second.candidate.answers),

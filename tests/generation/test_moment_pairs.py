@@ -117,7 +117,9 @@ def some_ladders(draw):
     for text in ("last", "second to last"):
         for number, answer in enumerate(draw(st.lists(names, max_size=12))):
             rungs = draw(st.frozensets(st.sampled_from([10, 30, 100])))
-            candidate = Candidate("t", text, (), (10 * number, 10 * number + 1), (answer,), ())
+            asked = 10 * max(0, number - (text != "last"))  # the event before it
+            clues = (asked, asked + 1, 10 * number, 10 * number + 1)
+            candidate = Candidate("t", "What {}?", (text,), clues, (answer,), ())
             found.append(Ladder(candidate, rungs))
     return found
 
@@ -135,6 +137,23 @@ def test_what_is_chosen_is_balanced_and_asks_nothing_twice(found, most):
         assert abs(second.evidence - fourth.evidence) < apart
         assert (first.reply, second.reply) == (fourth.reply, third.reply)
         assert one.rungs and all(set(one.rungs) <= it.rungs for it in one.ladders)
+
+
+@given(some_ladders())
+def test_no_event_is_told_by_two_pairs_of_answers(found):
+    answers = defaultdict(set)
+    for one in choose(list(mirrors(found, strictly)), 100):
+        for ladder in one.ladders:
+            answers[ladder.candidate.form, ladder.candidate.clues[0]].add(one.fact)
+    assert all(len(facts) == 1 for facts in answers.values())
+
+
+def test_no_event_of_the_bundled_set_is_told_by_two_pairs_of_answers():
+    answers = defaultdict(set)
+    for question in pair_moments(BUNDLED, RUNGS, 100, strictly).questions:
+        words = "open" if "open" in question.text else question.text.partition(" ")[0]
+        answers[question.traj_id, words, question.clues[0]].add(question.fact)
+    assert answers and all(len(facts) == 1 for facts in answers.values())
 
 
 def test_the_pairs_are_a_task(folder, run_cli, tmp_path):
