@@ -112,14 +112,15 @@ def assert_time_tells_nothing(questions):
 
 @st.composite
 def some_ladders(draw):
-    names = st.sampled_from(["mug", "bowl", "fridge", "safe"])
+    """Questions on events in a row, by how many others have followed."""
+    events = draw(st.lists(st.sampled_from(["fridge", "safe", "box"]), min_size=4, max_size=16))
     found = []
-    for text in ("last", "second to last"):
-        for number, answer in enumerate(draw(st.lists(names, max_size=12))):
-            rungs = draw(st.frozensets(st.sampled_from([10, 30, 100])))
-            asked = 10 * max(0, number - (text != "last"))  # the event before it
-            clues = (asked, asked + 1, 10 * number, 10 * number + 1)
-            candidate = Candidate("t", "What {}?", (text,), clues, (answer,), ())
+    for n_later, ordinal in enumerate(("last", "second to last", "third to last")):
+        for number, answer in enumerate(events[: len(events) - n_later]):
+            frames = range(10 * number, 10 * (number + n_later) + 1, 10)
+            clues = tuple(clue for frame in frames for clue in (frame, frame + 1))
+            rungs = draw(st.frozensets(st.sampled_from([10, 30, 100]), min_size=1))
+            candidate = Candidate("t", "What {}?", (ordinal,), clues, (answer,), ())
             found.append(Ladder(candidate, rungs))
     return found
 
