@@ -72,7 +72,7 @@ def _side(
         n_after_clues=n_after_clues,
     )
     if other.traj_id == question.traj_id and question.moment is not None:
-        return _until(side, question.moment, max(clues), min(clues))
+        return _until(side, question.moment, max(question.clues), min(question.clues))
     pair = data.twins.get(question.traj_id)
     if pair is None:
         raise DataError(
