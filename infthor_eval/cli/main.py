@@ -60,6 +60,8 @@ _COMMANDS = {
         "twins": "Make twins: the same episode with one thing changed.",
         "validate": "Keep the questions that one of several models answers.",
         "bundle": "Build a question set from a manifest.",
+        "pack": "Write a set as few Parquet files.",
+        "unpack": "Write a packed set as a folder again.",
         "card": "Write a data set card and a Croissant file of a set.",
         "scenes": "Draw a scene, or export it for machines without Unity.",
     },
@@ -81,6 +83,8 @@ _SHARED_MODULES = {
     "questions": "data.questions:questions",
     "moments": "data.questions:moments",
     "twins": "data.questions:twins",
+    "pack": "data.pack:pack",
+    "unpack": "data.pack:unpack",
     "export": "exchange:export",
     "import-replies": "exchange:import_replies",
 }

@@ -3,9 +3,8 @@
 A trajectory has thousands of frames and a question refers to many of them, so requests carry
 references and the model's adapter decodes. Caches recognise a frame by the digest of its content.
 
-A frame is a file, or a file with patches laid over it: twins have frames that differ in a small
-part (`shared_frames`). Pictures look as a browser shows them on white: nothing shows of colours
-under transparency, 16 bits of grey are read as 8, and EXIF data turn the picture.
+Pictures look as a browser shows them on white: nothing shows of colours under transparency, 16 bits
+of grey are read as 8, and EXIF data turn the picture.
 """
 
 import re
@@ -22,8 +21,9 @@ from PIL import ExifTags, Image, UnidentifiedImageError
 from PIL.Image import Transpose
 
 from infthor_eval.errors import DataError, wrap_errors
+from infthor_eval.formats.packed.paths import PackedPath, SetPath
 from infthor_eval.formats.reading import file_problem, read_bytes, require_file
-from infthor_eval.storage.digests import digest, digest_of_file
+from infthor_eval.storage.digests import digest
 from infthor_eval.storage.limits import IMAGE_ASPECT, IMAGE_MEGAPIXELS
 
 Image.MAX_IMAGE_PIXELS = None  # `_wrong_size` has the limit, which users can raise
@@ -32,6 +32,7 @@ _PNG = b"\x89PNG\r\n\x1a\n"
 _SIGNATURE = re.compile(rb"\x89PNG\r\n\x1a\n|\xff\xd8\xff|RIFF.{4}WEBP", re.DOTALL)
 _HEAD = 24  # bytes of a PNG up to the end of its width and height
 _HINT = "restore the frame"
+_NO_IMAGE = "not a PNG, JPEG or WebP image"
 _SUFFIXES = {".png", ".jpg", ".jpeg", ".webp"}
 _NUMBER = re.compile(r"([0-9]+)")
 # All that Pillow's decoders have raised on damaged or forged images.
@@ -56,60 +57,36 @@ _TURNS |= {8: Transpose.ROTATE_90}
 
 
 @dataclass(frozen=True)
-class Patch:
-    """A picture laid over a part of another one, which shows where the patch is transparent.
-
-    Attributes:
-        path: its file (PNG).
-        left: column of the picture below where it begins, pixels.
-        top: row of the picture below where it begins, pixels.
-    """
-
-    path: Path
-    left: int
-    top: int
-
-
-@dataclass(frozen=True)
 class FrameRef:
     """One frame of a trajectory.
 
     Attributes:
-        path: its image (PNG, JPEG or WebP; 300x300 in the published data), or the one below its
-            patches.
-        patches: what is laid over it, the lowest first.
+        path: its image (PNG, JPEG or WebP; 300x300 in the published data).
     """
 
-    path: Path
-    patches: tuple[Patch, ...] = ()
+    path: SetPath
 
     @property
     def name(self) -> str:
-        """Name of its file; with patches another one, which differs where any of them does."""
-        if not self.patches:
-            return self.path.name
-        layers = [f"{patch.path.name}@{patch.left},{patch.top}" for patch in self.patches]
-        return f"{digest(' '.join([self.path.name, *layers]))}.png"
+        """Name of its file."""
+        return self.path.name
 
     @cached_property
     def n_bytes(self) -> int | None:
-        """Size of its files, or None if one is missing."""
+        """Size of its file, or None if it is missing."""
         try:
-            return sum(path.stat().st_size for path in self._paths)
+            return self.path.stat().st_size
         except OSError:
             return None
 
     @cached_property
     def digest(self) -> str:
-        """Hash of its content (hex, 32 characters): of its file's if it has no patches.
+        """Hash of its file's content (hex, 32 characters).
 
         Raises:
-            DataError: a file cannot be read.
+            DataError: the file cannot be read.
         """
-        if not self.patches:
-            return _digest_of(self.path)
-        layers = [f"{_digest_of(patch.path)}@{patch.left},{patch.top}" for patch in self.patches]
-        return digest(" ".join([_digest_of(self.path), *layers]))
+        return digest(read_bytes(self.path, _HINT))
 
     @cached_property
     def size(self) -> tuple[int, int]:
@@ -123,43 +100,23 @@ class FrameRef:
 
     @cached_property
     def conversions(self) -> str:
-        """What `load` does to the picture below the patches, in words; raises as `size`."""
+        """What `load` does to the picture, in words; raises as `size`."""
         with _open(self.path) as image:
             return _conversions(image)
 
     @cached_property
     def problem(self) -> str | None:
-        """Why this cannot be a frame, by the first bytes of its files, or None."""
-        return next(filter(None, map(_problem_of, self._paths)), None)
+        """Why this cannot be a frame, by the first bytes of its file, or None."""
+        return _problem_of(self.path)
 
     def load(self) -> Image.Image:
         """Return the frame as an RGB image, as a browser shows it on white.
 
         Raises:
-            DataError: a file is missing, truncated, or no image of a valid size, or a patch reaches
-                beyond the picture below it.
+            DataError: the file is missing, truncated, or no image of a valid size.
         """
         with _open(self.path) as image:
-            frame = _as_shown(image)
-        n_pixels = frame.width * frame.height
-        for patch in self.patches:
-            with _open(patch.path) as image:
-                n_pixels += image.width * image.height
-                if n_pixels > IMAGE_MEGAPIXELS.value * 1_000_000:
-                    raise DataError(
-                        f"{patch.path}: with it, the picture and its patches have more than "
-                        f"{IMAGE_MEGAPIXELS.value} million pixels; {IMAGE_MEGAPIXELS.hint}"
-                    )
-                layer = image.convert("RGBA")
-            right = patch.left + layer.width
-            bottom = patch.top + layer.height
-            if right > frame.width or bottom > frame.height:
-                raise DataError(
-                    f"{patch.path}: reaches to {right},{bottom}, beyond the {frame.width}x"
-                    f"{frame.height} pixels of {self.path.name}; {_HINT}"
-                )
-            frame.paste(layer, (patch.left, patch.top), layer)
-        return frame
+            return _as_shown(image)
 
     def png(self) -> bytes:
         """Return the frame as the content of a PNG file.
@@ -174,17 +131,13 @@ class FrameRef:
     def encoded(self) -> tuple[bytes, str]:
         """Return content and media type of its file, or of a PNG if it is not shown as its file
         is; raises as `load`."""
-        if self.patches or self.conversions:
+        if self.conversions:
             return self.png(), "image/png"
         with _open(self.path) as image:
             return read_bytes(self.path, _HINT), Image.MIME[str(image.format)]
 
-    @property
-    def _paths(self) -> list[Path]:
-        return [self.path, *(patch.path for patch in self.patches)]
 
-
-def find_images(folder: Path) -> dict[str, Path]:
+def find_images(folder: SetPath) -> dict[str, SetPath]:
     """Return the PNG, JPEG and WebP files of a folder by stem, in the order of their names.
 
     Numbers in names count as numbers: `2.png` comes before `10.png`.
@@ -192,7 +145,7 @@ def find_images(folder: Path) -> dict[str, Path]:
     Raises:
         DataError: two of them have one stem.
     """
-    images: dict[str, Path] = {}
+    images: dict[str, SetPath] = {}
     paths = [path for path in folder.iterdir() if path.suffix.lower() in _SUFFIXES]
     for path in sorted(paths, key=_by_numbers):
         if path.stem in images:
@@ -201,34 +154,31 @@ def find_images(folder: Path) -> dict[str, Path]:
     return images
 
 
-def _by_numbers(path: Path) -> tuple[list[tuple[int, str]], str]:
+def _by_numbers(path: SetPath) -> tuple[list[tuple[int, str]], str]:
     parts = _NUMBER.split(path.stem)  # every second one is a number
     return [(int(part), "") if at % 2 else (0, part) for at, part in enumerate(parts)], path.name
 
 
-def _digest_of(path: Path) -> str:
-    require_file(path, _HINT)
-    with wrap_errors(f"{path}: cannot be read", _HINT):
-        return digest_of_file(path)
-
-
-def _problem_of(path: Path) -> str | None:
+def _problem_of(path: SetPath) -> str | None:
     reason = file_problem(path)
     if reason is not None:
         return f"{path}: {reason}"
+    if isinstance(path, PackedPath):  # whose frames may be on a server
+        size = path.image_size
+        return _wrong_size(path, *size) if size else f"{path}: {_NO_IMAGE}"
     try:
         with path.open("rb") as file:
             head = file.read(_HEAD)
     except OSError as error:
         return f"{path}: cannot be read ({error.strerror})"
     if _SIGNATURE.match(head) is None:
-        return f"{path}: not a PNG, JPEG or WebP image"
+        return f"{path}: {_NO_IMAGE}"
     is_whole_png_head = head.startswith(_PNG) and len(head) == _HEAD and head[12:16] == b"IHDR"
     return _wrong_size(path, *struct.unpack(">II", head[16:])) if is_whole_png_head else None
 
 
 @contextmanager
-def _open(path: Path) -> Iterator[Image.Image]:
+def _open(path: SetPath) -> Iterator[Image.Image]:
     require_file(path, _HINT)
     with (
         wrap_errors(f"{path}: not a readable image", _HINT, catch=_DAMAGED),
@@ -240,14 +190,15 @@ def _open(path: Path) -> Iterator[Image.Image]:
         yield image
 
 
-def _opened(path: Path) -> Image.Image:
+def _opened(path: SetPath) -> Image.Image:
     try:
-        return Image.open(path, formats=("PNG", "JPEG", "WEBP"))
+        file = path if isinstance(path, Path) else path.open()
+        return Image.open(file, formats=("PNG", "JPEG", "WEBP"))
     except UnidentifiedImageError as error:  # its message is the path
         raise DataError(f"{path}: not a readable image (not PNG, JPEG or WebP); {_HINT}") from error
 
 
-def _wrong_size(path: Path, width: int, height: int) -> str | None:
+def _wrong_size(path: SetPath, width: int, height: int) -> str | None:
     """Return why an image of this size is refused: for its memory, or by image processors."""
     if min(width, height) < 1:
         return f"{path}: an image of {width}x{height} pixels"

@@ -3,9 +3,9 @@
 The folder has the layout of the published data (hub dataset `PEARLS-Lab/infini-thor-nieh`):
 `qa_set*.csv` beside `metadata/<traj_id>/` with `img/` (or `img_768/`), `metadata.json`,
 `expert_log.json` and, in some sets, `<traj_id>_10fps.mp4`. The trajectory files are in a separate
-folder (published data) or inside the set (ours). Twins share pictures (`shared_frames`). An action
-has one frame in our sets, and possibly several in others (`expert_log.json`, or the step log of the
-layout that the branch `dev` reads).
+folder (published data) or inside the set (ours). Twins share pictures (`shared_frames`). A set may
+be packed in Parquet (`packed`). An action has one frame in our sets, and possibly several in others
+(`expert_log.json`, or the step log of the layout that the branch `dev` reads).
 
 Question files alone, without `metadata/`, are a set too: for whatever needs no frame. So is a
 folder of one's own frames and questions (`own_folder`).
@@ -27,6 +27,7 @@ from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.frames import FrameRef, find_images
 from infthor_eval.formats.outline import Outline, find_outline, read_outline, read_states
 from infthor_eval.formats.own_folder import OwnFolder, find_own_folder
+from infthor_eval.formats.packed.paths import SetPath, metadata_folder
 from infthor_eval.formats.pictures.video import Video, read_video
 from infthor_eval.formats.qa_csv import read_questions
 from infthor_eval.formats.question import Question, SkippedQuestion
@@ -78,7 +79,8 @@ class NiehSet:
         self.root = root
         self.directory = root if root.is_dir() else root.parent
         self.question_files = sorted(root.glob("qa_set*.csv")) if root.is_dir() else [root]
-        self.has_frames = (self.directory / "metadata").is_dir()
+        self._metadata = metadata_folder(self.directory if root.is_file() else root)
+        self.has_frames = self._metadata.is_dir()
         self._own: OwnFolder | None = None
         if not self.has_frames and (root.is_file() or not self.question_files):
             self._own = find_own_folder(root)
@@ -195,11 +197,11 @@ class NiehSet:
         """Return the number of skipped questions by reason."""
         return Counter(question.reason for question in self.skipped)
 
-    def folder(self, traj_id: str) -> Path:
-        """Return the folder of a trajectory's frames and metadata."""
+    def folder(self, traj_id: str) -> SetPath:
+        """Return the folder of a trajectory's frames and metadata, that of all without a name."""
         if self._own is not None:
             return self._own.folders.get(traj_id, self.directory)
-        return self.directory / "metadata" / traj_id
+        return self._metadata / traj_id
 
     def frames(self, traj_id: str) -> tuple[FrameRef, ...]:
         """Return all frames of a trajectory in time order.
@@ -256,7 +258,7 @@ class NiehSet:
         position_of = {number: at for at, number in enumerate(self._trajectory(question.traj_id))}
         return tuple(position_of[number] for number in question.clues)
 
-    def outline_file(self, traj_id: str) -> Path | None:
+    def outline_file(self, traj_id: str) -> SetPath | None:
         """Return the file of the trajectory itself, or None if there is none."""
         if self.trajectories is not None:
             return find_outline(self.trajectories, traj_id)
@@ -322,7 +324,7 @@ class NiehSet:
             self.folder(traj_id) / "state_summary.json"
         )
 
-    def video(self, traj_id: str) -> Path | None:
+    def video(self, traj_id: str) -> SetPath | None:
         """Return the trajectory's video, or None if it has none."""
         path = self._video_path(traj_id)
         return path if path.is_file() else None
@@ -337,7 +339,7 @@ class NiehSet:
             self._videos, (traj_id, fps), lambda: read_video(self._video_path(traj_id), fps)
         )
 
-    def _video_path(self, traj_id: str) -> Path:
+    def _video_path(self, traj_id: str) -> SetPath:
         return self.folder(traj_id) / f"{traj_id}_10fps.mp4"
 
     def _problem(self, question: Question) -> str | None:
@@ -394,7 +396,7 @@ def _read_once(cache: dict[K, T | DataError], key: K, read: Callable[[], T]) -> 
     return result
 
 
-def _read_frames(folder: Path, shared_frames: dict[str, FrameRef]) -> dict[int, FrameRef]:
+def _read_frames(folder: SetPath, shared_frames: dict[str, FrameRef]) -> dict[int, FrameRef]:
     """Return the frames by their number (`img_idx`), in time order.
 
     Pictures that several trajectories share are kept in `shared_frames`, by their line.
@@ -447,7 +449,7 @@ class _Log(msgspec.Struct):
     images: list[_Image]
 
 
-def _read_action_log(path: Path, positions: Mapping[str, int]) -> dict[int, tuple[int, ...]]:
+def _read_action_log(path: SetPath, positions: Mapping[str, int]) -> dict[int, tuple[int, ...]]:
     """Return the frames of each low-level action that has any; `positions` are those of file
     stems."""
     log = read_json(path, _REPLAY_HINT, _Log)

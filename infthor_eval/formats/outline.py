@@ -9,6 +9,7 @@ import msgspec
 
 from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.object_ids import object_type_of
+from infthor_eval.formats.packed.paths import SetPath
 from infthor_eval.formats.reading import NOT_JSON, read_bytes
 
 _SUFFIXES = (".json", ".txt")  # both hold JSON; the published scripts accept either
@@ -115,7 +116,7 @@ def find_outline(folder: Path, traj_id: str) -> Path | None:
     return next((path for path in paths if path.is_file()), None)
 
 
-def read_outline(path: Path) -> Outline:
+def read_outline(path: SetPath) -> Outline:
     """Read a trajectory's file."""
     content = read_bytes(path, "restore it")
     with wrap_errors(f"{path}: not a trajectory", "restore it", catch=NOT_JSON):
@@ -126,7 +127,7 @@ def read_outline(path: Path) -> Outline:
     return outline
 
 
-def read_states(path: Path) -> dict[int, str]:
+def read_states(path: SetPath) -> dict[int, str]:
     """Read a `state_summary.json`: states by low-level action; empty if there is no such file."""
     if not path.exists():
         return {}

@@ -18,6 +18,7 @@ from pathlib import Path
 from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.csv_files import CsvRow, read_rows, unshield
 from infthor_eval.formats.frames import find_images
+from infthor_eval.formats.packed.paths import SetPath
 from infthor_eval.formats.question import Question, SkippedQuestion
 
 _COLUMNS = ("question", "answer")
@@ -64,7 +65,7 @@ class OwnFolder:
                 )
 
     def _entry(
-        self, row: CsvRow, images: Mapping[str, Mapping[str, Path]]
+        self, row: CsvRow, images: Mapping[str, Mapping[str, SetPath]]
     ) -> Question | SkippedQuestion:
         cells = {name: unshield(cell).strip() for name, cell in row.cells.items()}
         traj_id = cells.get("trajectory", "")
@@ -119,7 +120,7 @@ def find_own_folder(root: Path) -> OwnFolder | None:
     return OwnFolder(files[0], {_ONLY: root} if in_itself else folders)
 
 
-def _clues(cell: str, images: Mapping[str, Path]) -> tuple[int, ...]:
+def _clues(cell: str, images: Mapping[str, SetPath]) -> tuple[int, ...]:
     """Return the places of clue frames in time order, from 0."""
     if not cell:
         return tuple(range(len(images)))

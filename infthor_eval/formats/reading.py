@@ -23,7 +23,7 @@ from typing import Any, TypeVar, overload
 import msgspec
 
 from infthor_eval.errors import DataError, in_one_line, wrap_errors
-from infthor_eval.storage.files import PACKED
+from infthor_eval.formats.packed.paths import SetPath
 from infthor_eval.storage.limits import FILE_MB, LINE_MB
 
 T = TypeVar("T")
@@ -36,10 +36,9 @@ DAMAGED_ZIP = (zipfile.BadZipFile, OSError, RuntimeError, struct.error, *DAMAGED
 # What `msgspec` raises on what is not JSON of its type.
 NOT_JSON = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
 _MB = 2**20
-_XZ_MB = 256  # memory that a packed file may ask for
 
 
-def file_problem(path: Path) -> str | None:
+def file_problem(path: SetPath) -> str | None:
     """Return why a path is not a file that can be opened without blocking, or None if it is one."""
     try:
         mode = path.stat().st_mode
@@ -50,7 +49,7 @@ def file_problem(path: Path) -> str | None:
     return "is a folder, not a file" if stat.S_ISDIR(mode) else "is a pipe or a device, not a file"
 
 
-def require_file(path: Path, hint: str, max_mb: int | None = None) -> None:
+def require_file(path: SetPath, hint: str, max_mb: int | None = None) -> None:
     """Check that a path is a file that can be read, of at most `max_mb` MiB."""
     reason = file_problem(path)
     if reason is not None:
@@ -67,49 +66,26 @@ def require_plain_files(folder: Path, hint: str) -> None:
                 require_file(path, hint)
 
 
-def read_bytes(path: Path, hint: str) -> bytes:
+def read_bytes(path: SetPath, hint: str) -> bytes:
     """Return the content of a file; `hint` is the way to fix a bad one, for the message."""
     require_file(path, hint, FILE_MB.value)
     with wrap_errors(f"{path}: cannot be read", hint):
         return path.read_bytes()
 
 
-def find_packed(path: Path) -> Path:
-    """Return the packed file (`.xz`) in a file's place, or the file itself if there is none."""
-    packed = path.with_name(f"{path.name}{PACKED}")
-    return packed if packed.exists() else path
-
-
-def read_packed_bytes(path: Path, hint: str) -> bytes:
-    """Return the unpacked content of a file that may be packed (`.xz`)."""
-    if path.suffix != PACKED:
-        return read_bytes(path, hint)
-    packed = read_bytes(path, hint)
-    limit = FILE_MB.value * _MB
-    unpacker = lzma.LZMADecompressor(lzma.FORMAT_XZ, memlimit=_XZ_MB * _MB)
-    with wrap_errors(f"{path}: cannot be unpacked", hint, catch=lzma.LZMAError):
-        content = unpacker.decompress(packed, limit + 1)
-    if len(content) > limit:
-        raise DataError(f"{path}: is larger than {FILE_MB.value} MiB; {FILE_MB.hint}")
-    if not unpacker.eof:
-        raise DataError(f"{path}: cannot be unpacked (it ends early); {hint}")
-    return content
-
-
-def read_text(path: Path, hint: str) -> str:
-    """Return the content of a UTF-8 file (`.xz` too) without byte order mark; line ends are
-    kept."""
+def read_text(path: SetPath, hint: str) -> str:
+    """Return the content of a UTF-8 file without byte order mark; line ends are kept."""
     with wrap_errors(f"{path}: not UTF-8 text", hint, catch=UnicodeDecodeError):
-        return read_packed_bytes(path, hint).decode("utf-8-sig")
+        return read_bytes(path, hint).decode("utf-8-sig")
 
 
 @overload
-def read_json(path: Path, hint: str) -> Any: ...
+def read_json(path: SetPath, hint: str) -> Any: ...
 @overload
-def read_json(path: Path, hint: str, data_type: type[T]) -> T: ...
-def read_json(path: Path, hint: str, data_type: Any = Any) -> Any:
-    """Return the content of a JSON file (`.xz` too) as the type that `msgspec` decodes it to."""
-    content = read_packed_bytes(path, hint)
+def read_json(path: SetPath, hint: str, data_type: type[T]) -> T: ...
+def read_json(path: SetPath, hint: str, data_type: Any = Any) -> Any:
+    """Return the content of a JSON file as the type that `msgspec` decodes it to."""
+    content = read_bytes(path, hint)
     expected = "valid JSON" if data_type is Any else "in its documented form"
     with wrap_errors(f"{path}: not {expected}", hint, catch=NOT_JSON):
         return msgspec.json.decode(content, type=data_type)

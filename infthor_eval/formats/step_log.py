@@ -1,7 +1,5 @@
 """The log of a replayed trajectory: `metadata/<traj_id>/metadata.json`, one entry per frame.
 
-It may be packed, as `metadata.json.xz`.
-
 Published data have four layouts (`Layout`), and all are read. In the last one `img_idx` is a list
 of objects with `low_idx` and `img_filename`, as the loader of the branch `dev` reads it. Published
 entries have `img_idx`, `img_filename`, `step` and `object_log`. Ours add optional fields for the
@@ -20,10 +18,10 @@ import msgspec
 
 from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import find_images
-from infthor_eval.formats.reading import find_packed, read_json, read_packed_bytes
-from infthor_eval.storage.files import write_packed
+from infthor_eval.formats.packed.paths import SetPath
+from infthor_eval.formats.reading import read_json
 
-_FILE = "metadata.json"
+LOG = "metadata.json"
 _HINT = "replay the trajectory again or restore the published file"
 
 
@@ -156,12 +154,12 @@ class Step(msgspec.Struct, omit_defaults=True):
     low_idx: int | None = None
 
 
-def log_file(folder: Path) -> Path:
+def log_file(folder: SetPath) -> SetPath:
     """Return the file of the log of the trajectory in `metadata/<traj_id>`, if it has one."""
-    return find_packed(Path(folder) / _FILE)
+    return folder / LOG
 
 
-def read_steps(folder: Path) -> list[Step]:
+def read_steps(folder: SetPath) -> list[Step]:
     """Read the log of the trajectory in `metadata/<traj_id>`: an entry a frame, in file order.
 
     A folder of frames alone, without a log, has an entry a frame that says only which it is.
@@ -177,12 +175,7 @@ def read_steps(folder: Path) -> list[Step]:
 def write_steps(folder: Path, steps: Sequence[Step]) -> None:
     """Write the log of a trajectory into its folder, which must exist: a list, an entry a line."""
     lines = b",\n".join(msgspec.json.encode(step) for step in steps)
-    (Path(folder) / _FILE).write_bytes(b"[\n" + lines + b"\n]\n")
-
-
-def pack_steps(source: Path, folder: Path) -> None:
-    """Write the log of the trajectory in `source` into another folder, packed."""
-    write_packed(Path(folder) / _FILE, read_packed_bytes(log_file(source), _HINT))
+    (Path(folder) / LOG).write_bytes(b"[\n" + lines + b"\n]\n")
 
 
 def iter_object_states(steps: Sequence[Step]) -> Iterator[dict[str, ObjectState]]:
@@ -196,7 +189,7 @@ def iter_object_states(steps: Sequence[Step]) -> Iterator[dict[str, ObjectState]
         yield states
 
 
-def layout_of(folder: Path) -> Layout:
+def layout_of(folder: SetPath) -> Layout:
     """Return the layout of the log of the trajectory in `metadata/<traj_id>`."""
     if _unlogged_images(folder):
         return Layout.NONE
@@ -204,14 +197,14 @@ def layout_of(folder: Path) -> Layout:
     return _layout(path, read_json(path, _HINT))
 
 
-def _unlogged_images(folder: Path) -> list[Path]:
+def _unlogged_images(folder: SetPath) -> list[SetPath]:
     """Return the frames that are in a folder itself, if it has no log of them."""
     if log_file(folder).exists() or not folder.is_dir():
         return []
     return list(find_images(folder).values())
 
 
-def _layout(path: Path, document: Any) -> Layout:
+def _layout(path: SetPath, document: Any) -> Layout:
     if isinstance(document, list):
         return Layout.LIST
     if not isinstance(document, dict) or "img_idx" not in document:
@@ -223,7 +216,7 @@ def _layout(path: Path, document: Any) -> Layout:
     return Layout.OBJECTS if are_objects else Layout.COLUMNS
 
 
-def _entries(path: Path, document: Any) -> list[dict[str, Any]]:
+def _entries(path: SetPath, document: Any) -> list[dict[str, Any]]:
     """Return the entries of any layout as a list of dicts."""
     match _layout(path, document):
         case Layout.LIST:
@@ -244,7 +237,7 @@ def _entries(path: Path, document: Any) -> list[dict[str, Any]]:
             ]
 
 
-def _rows(path: Path, columns: dict[str, Any]) -> list[dict[str, Any]]:
+def _rows(path: SetPath, columns: dict[str, Any]) -> list[dict[str, Any]]:
     """Return the rows of a dict of columns; values that are not lists are remarks, not columns."""
     lists = {name: column for name, column in columns.items() if isinstance(column, list)}
     n_rows = len(columns["img_idx"])
@@ -257,7 +250,7 @@ def _rows(path: Path, columns: dict[str, Any]) -> list[dict[str, Any]]:
     return [dict(zip(lists, row, strict=True)) for row in zip(*lists.values(), strict=True)]
 
 
-def _step(path: Path, index: int, entry: object) -> Step:
+def _step(path: SetPath, index: int, entry: object) -> Step:
     if (
         isinstance(entry, dict)
         and "img_filename" not in entry

@@ -15,6 +15,7 @@ import msgspec
 from msgspec import Meta
 
 from infthor_eval.errors import DataError, wrap_errors
+from infthor_eval.formats.packed.paths import SetPath
 from infthor_eval.formats.reading import lines_of, read_bytes
 from infthor_eval.formats.twins import TwinWorld
 from infthor_eval.storage.digests import digest
@@ -231,7 +232,7 @@ class TrajectorySource:
     `line` is its line in the file, from 1; None if the file holds only this trajectory.
     """
 
-    path: Path
+    path: SetPath
     line: int | None
     raw: bytes
 
@@ -265,6 +266,11 @@ class TrajectorySource:
         in_file = stem if self.line is None else f"{stem}-{self.line}"
         trajectory.traj_id = trajectory.traj_id or trajectory.task_id or in_file
         return trajectory
+
+
+def read_trajectory(path: SetPath) -> Trajectory:
+    """Read a file with one trajectory; raises as `TrajectorySource.read`."""
+    return TrajectorySource(path, None, read_bytes(path, _HINT)).read()
 
 
 def iter_sources(path: Path) -> Iterator[TrajectorySource]:

@@ -1,7 +1,7 @@
 """Bundled sets of twins that have the trajectories of their worlds in place of frames.
 
-`worlds.jsonl.xz` has a trajectory a line, and `drawn.json` a digest of each world's frames and log.
-The set with its frames is in the user's cache once they are drawn.
+`worlds.jsonl.zst` has a trajectory a line, and `drawn.json` a digest of each world's frames and
+log. The set with its frames is in the user's cache once they are drawn.
 """
 
 from pathlib import Path
@@ -9,7 +9,7 @@ from pathlib import Path
 from infthor_eval.storage.digests import digest_of_file
 from infthor_eval.storage.folders import user_cache
 
-WORLDS = "worlds.jsonl.xz"
+WORLDS = "worlds.jsonl.zst"
 DIGESTS = "drawn.json"
 SET_INFO = "set.json"
 

@@ -1,8 +1,8 @@
 """Building the question sets of the package reproducibly from a manifest of scenes and seeds.
 
 The manifest has the trajectories to generate and how questions are sampled, or how twins are made
-of them. The copy of it in the set also has the digest of every file, so that a test can check that
-the same files are built again.
+of them. The copy of it in the set also has digests of its files and trajectories, so that a test
+can check that the same ones are built again.
 
 A set is built in a hidden folder within the new one, and moved out of it when it is whole. A build
 that was stopped goes on there with the trajectories that it had. Twins are copied without what
@@ -13,7 +13,7 @@ import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import chain
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
 import msgspec
@@ -23,12 +23,13 @@ from msgspec.structs import replace
 from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.packed.writing import PackSettings, pack_set
 from infthor_eval.formats.qa_csv import write_questions
 from infthor_eval.formats.reading import read_json
-from infthor_eval.formats.shared_frames import write_frame_names
-from infthor_eval.formats.step_log import pack_steps
+from infthor_eval.formats.shared_frames import store_picture, write_frame_names
+from infthor_eval.formats.step_log import LOG
 from infthor_eval.formats.twins import ComparedFrame, TwinPair, read_pairs, write_pairs
-from infthor_eval.generation.compact.pictures import PictureStore, reduce_colors
+from infthor_eval.generation.compact.pictures import encode, encode_alike, reduce_colors
 from infthor_eval.generation.generate_set import generate_set
 from infthor_eval.generation.questions.generate import GeneratedQuestions, generate_questions
 from infthor_eval.generation.replay_set import replay_set, select
@@ -37,7 +38,7 @@ from infthor_eval.generation.twins.drafting import TwinSettings
 from infthor_eval.generation.twins.pairing import ScoreReply
 from infthor_eval.generation.twins.twin_set import TwinSummary, make_twins
 from infthor_eval.generation.twins.undrawn import copy_questions, pack_worlds
-from infthor_eval.storage.digests import digest_of_file, fingerprint
+from infthor_eval.storage.digests import digest_of_file, digest_of_files, fingerprint
 from infthor_eval.storage.files import remove, write_atomically
 from infthor_eval.thor.launch import embedded_launch
 from infthor_eval.thor.simulator import Simulator
@@ -50,7 +51,9 @@ _WORK = ".building-"  # of the hidden folder; the fingerprint of the manifest fo
 # In the hidden folder: what is kept of a stopped build, and the set, which is made anew.
 _TRAJECTORIES = "trajectories"
 _REPLAYED = "replayed"
+_WHOLE = "whole"
 _SET = "set"
+_TOGETHER = PackSettings(frames_per_group=2_000, level=19)  # all of a trajectory, or base
 
 
 class TrajectoryRecipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -72,7 +75,7 @@ class Manifest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         question_seed: seed of the choice of questions.
         further: True to include our further question forms.
         colors: number of colours in the palette of stored frames, which halves the size of the set.
-        files: digests of all files of the set by path; empty in a manifest before the first build.
+        files: digests of files and trajectories by path; empty before the first build.
     """
 
     name: Annotated[str, Meta(pattern=r"^[\w.-]+$")]
@@ -94,7 +97,7 @@ class TwinsManifest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         per_trajectory: maximum number of paired questions on one trajectory.
         frames: False for the trajectories of the worlds in place of their frames.
         colors: number of colours of the pictures of one trajectory.
-        files: digests of all files of the set by path; empty in a manifest before the first build.
+        files: digests of files and trajectories by path; empty before the first build.
     """
 
     name: Annotated[str, Meta(pattern=r"^[\w.-]+$")]
@@ -151,12 +154,12 @@ def build_bundle(
             per_trajectory=manifest.per_trajectory,
             further=manifest.further,
         )
-        whole = work / _SET
+        whole = work / _WHOLE
         shutil.copytree(work / _REPLAYED, whole, ignore=shutil.ignore_patterns(_NOT_SHIPPED))
         write_questions(whole / f"qa_set_{manifest.name}.csv", generated.questions)
         for frame in sorted(whole.rglob("img/*.png")):
-            _reduce_colors(frame, manifest.colors)
-        return _write_manifest(manifest, whole), generated
+            frame.write_bytes(encode(reduce_colors(FrameRef(frame).load(), manifest.colors)))
+        return _pack(manifest, work), generated
 
 
 def build_twins(
@@ -192,13 +195,13 @@ def build_twins(
             advance=advance,
         )
         _raise_first(summary.failures)
-        whole = work / _SET
+        whole = work / _WHOLE
         whole.mkdir()
         if manifest.frames:
             copy_compactly(work / _REPLAYED, whole, manifest.colors)
         else:
             pack_worlds(work / _REPLAYED, whole)
-        return _write_manifest(manifest, whole), summary
+        return _pack(manifest, work), summary
 
 
 def differing_files(
@@ -217,7 +220,8 @@ def _building(manifest: Manifest | TwinsManifest, out: Path) -> Iterator[Path]:
     out.mkdir(parents=True, exist_ok=True)
     whole = work / _SET
     if (whole / MANIFEST).is_file():  # stopped while the set was moved
-        for name in _top_names(read_json(whole / MANIFEST, _HINT, type(manifest)).files):
+        moved = read_json(whole / MANIFEST, _HINT, type(manifest)).files.keys()
+        for name in {*moved, *(path.name for path in out.glob("*.parquet"))}:
             remove(out / name)
     elif (out / MANIFEST).is_file():  # stopped after that, or not at all
         remove(work)
@@ -228,15 +232,12 @@ def _building(manifest: Manifest | TwinsManifest, out: Path) -> Iterator[Path]:
         if other != work:
             remove(other)
     remove(whole)
+    remove(work / _WHOLE)
     work.mkdir(exist_ok=True)
     yield work
     for path in sorted(whole.iterdir(), key=lambda path: path.name == MANIFEST):  # that one last
         path.replace(out / path.name)
     remove(work)
-
-
-def _top_names(files: dict[str, str]) -> set[str]:
-    return {PurePosixPath(name).parts[0] for name in files}
 
 
 def _generate(
@@ -250,9 +251,12 @@ def _generate(
     _raise_first(generate_set(jobs, simulator, folder, advance).failures)
 
 
-def _write_manifest(manifest: _AnyManifest, out: Path) -> _AnyManifest:
-    """Write the manifest with the digests of the set's files into the set, and return it."""
-    finished = msgspec.structs.replace(manifest, files=_digests(out))
+def _pack(manifest: _AnyManifest, work: Path) -> _AnyManifest:
+    """Pack a built set, write the manifest with the digests of its parts into it, return that."""
+    out = work / _SET
+    out.mkdir()
+    pack_set(NiehSet(work / _WHOLE), out, _TOGETHER)
+    finished = msgspec.structs.replace(manifest, files=digests_of(work / _WHOLE))
     content = msgspec.json.format(msgspec.json.encode(finished), indent=1)
     with write_atomically(out / MANIFEST) as partial:  # it says that all is there
         partial.write_bytes(content + b"\n")
@@ -264,13 +268,15 @@ def _raise_first(failures: list[str]) -> None:
         raise DataError(f"the set cannot be built: {failures[0]}")
 
 
-def _reduce_colors(path: Path, colors: int) -> None:
-    reduce_colors(FrameRef(path).load(), colors).save(path, optimize=True)
-
-
-def _digests(root: Path) -> dict[str, str]:
-    files = sorted(path for path in root.rglob("*") if path.is_file() and path.name != MANIFEST)
-    return {str(path.relative_to(root)): digest_of_file(path) for path in files}
+def digests_of(root: Path) -> dict[str, str]:
+    """Return the digests of a set's files and trajectories; those of twins name their pictures."""
+    files = [path for path in root.iterdir() if path.is_file() and path.name != MANIFEST]
+    folders = list((root / "metadata").glob("*"))
+    digests = {path.name: digest_of_file(path) for path in sorted(files)}
+    for folder in sorted(folders):
+        inside = sorted(path for path in folder.rglob("*") if path.is_file())
+        digests[f"metadata/{folder.name}"] = digest_of_files(inside)
+    return digests
 
 
 def copy_compactly(source: Path, out: Path, colors: int) -> None:
@@ -302,13 +308,13 @@ def _copy_worlds(
     worlds: dict[str, Sequence[FrameRef]] = {
         name: data.frames(name) for pair in pairs for name in pair.traj_ids
     }
-    pictures = PictureStore(out, chain.from_iterable(worlds.values()), colors)
+    pictures = encode_alike(chain.from_iterable(worlds.values()), colors)
     for name, frames in worlds.items():
         folder = out / "metadata" / name
         folder.mkdir(parents=True)
-        stored = [pictures.name(frame) for frame in frames]
-        write_frame_names(folder, stored, packed=True)
-        pack_steps(data.folder(name), folder)
+        stored = [store_picture(out, pictures[frame], name) for frame in frames]
+        write_frame_names(folder, stored)
+        (folder / LOG).write_bytes((data.folder(name) / LOG).read_bytes())
         yield name, stored
 
 

@@ -61,7 +61,8 @@ def look_around_files(path: Path, out: Path, min_run: int = MIN_RUN) -> LookArou
         summary.changed += n_inserted > 0
         summary.steps += len(document["plan"]["low_actions"])
         summary.inserted += n_inserted
-        _write(document, out / source.path.relative_to(path) if path.is_dir() else out)
+        inside = str(source.path).removeprefix(f"{path}/")
+        _write(document, out / inside if path.is_dir() else out)
     return summary
 
 

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 from infthor_eval.errors import DataError, UsageError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.packed.hub import set_folder
 from infthor_eval.formats.question import Question, SkippedQuestion
 from infthor_eval.formats.undrawn import drawn_folder, is_drawn, is_undrawn
 from infthor_eval.nieh.contexts import (
@@ -121,7 +122,7 @@ class TaskSamples:
 @once_a_command
 def open_set(root: str, trajectories: str | None = None) -> NiehSet:
     """Open a folder's set, once for all runs of a command."""
-    return NiehSet(Path(root), Path(trajectories) if trajectories else None)
+    return NiehSet(set_folder(root), Path(trajectories) if trajectories else None)
 
 
 def find_set(
@@ -133,8 +134,8 @@ def find_set(
     """Return the set of a task.
 
     Args:
-        data: folder of an NIEH set; None for the published set where `infthor-eval fetch nieh` put
-            it.
+        data: folder of an NIEH set, or hf://OWNER/NAME; None for the published set where
+            `infthor-eval fetch nieh` put it.
         bundled: name of a set that comes with the package, which goes before `data`.
         trajectories: folder of the set's trajectories; None if they are in the set.
     """

@@ -54,7 +54,7 @@ def _describe(judged: JudgedQuestion, data: NiehSet, folder: Path) -> dict[str, 
 
 
 def _address(frame: FrameRef, folder: Path) -> str:
-    """Return where a page in `folder` finds a frame; one with patches is in the page itself."""
-    if frame.patches:
+    """Return where a page in `folder` finds a frame; one of a packed set is in the page."""
+    if not isinstance(frame.path, Path):
         return f"data:image/png;base64,{base64.b64encode(frame.png()).decode()}"
     return quote(os.path.relpath(frame.path, folder))

@@ -2,7 +2,6 @@
 
 import errno
 import fcntl
-import lzma
 import os
 import re
 import shutil
@@ -16,7 +15,6 @@ from typing import BinaryIO
 from infthor_eval.errors import DataError, UsageError, wrap_errors
 from infthor_eval.storage.digests import digest
 
-PACKED = ".xz"  # ends the name of a packed file
 OVERWRITE_HINT = "give another --out, or --overwrite if nobody edited it"
 # Other characters, and these names with any ending, mean something to some system.
 _NOT_IN_NAMES = re.compile(r"[^A-Za-z0-9 _.@+-]+")
@@ -176,16 +174,6 @@ def remove(path: Path) -> None:
         shutil.rmtree(path)
     else:
         path.unlink(missing_ok=True)
-
-
-def write_packed(path: Path, content: bytes) -> None:
-    """Write content packed, under the file's name with `PACKED`; the same content as equal bytes.
-
-    Raises:
-        OSError: it cannot be written.
-    """
-    packed = lzma.compress(content, check=lzma.CHECK_CRC32, preset=6 | lzma.PRESET_EXTREME)
-    path.with_name(f"{path.name}{PACKED}").write_bytes(packed)
 
 
 @contextmanager

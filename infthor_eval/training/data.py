@@ -10,7 +10,7 @@ from infthor_eval.errors import DataError, UsageError
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.step_log import read_steps
-from infthor_eval.formats.trajectory import Trajectory, iter_trajectories
+from infthor_eval.formats.trajectory import Trajectory, read_trajectory
 from infthor_eval.nieh.contexts import QuestionVariant
 from infthor_eval.nieh.contexts.video import as_images
 from infthor_eval.nieh.docs import doc_target
@@ -122,7 +122,7 @@ def action_sequences(
 
 def trajectory_names(data: NiehSet) -> list[str]:
     """Return the names of all trajectories of a set, including those without questions, sorted."""
-    return sorted(path.name for path in (data.root / "metadata").iterdir() if path.is_dir())
+    return sorted(path.name for path in data.folder("").iterdir() if path.is_dir())
 
 
 def read_history(data: NiehSet, name: str, words: Words) -> tuple[Trajectory, list[PlanSegment]]:
@@ -130,7 +130,7 @@ def read_history(data: NiehSet, name: str, words: Words) -> tuple[Trajectory, li
     path = data.outline_file(name)
     if path is None:
         raise DataError("its trajectory is not in the set")
-    trajectory = next(iter(iter_trajectories(path)))
+    trajectory = read_trajectory(path)
     steps = sorted(read_steps(data.folder(name)), key=lambda step: step.img_idx)
     return trajectory, recorded_segments(trajectory, steps, data.frames(name), words)
 

@@ -21,7 +21,8 @@ def shared(make_nieh_set):
     shutil.copytree(own, root)
     for folder in (root / "metadata").iterdir():
         images = sorted((folder / "img").iterdir())
-        write_frame_names(folder, [store_picture(root, image, folder.name) for image in images])
+        contents = (image.read_bytes() for image in images)
+        write_frame_names(folder, [store_picture(root, it, folder.name) for it in contents])
         shutil.rmtree(folder / "img")
     return root, own
 
@@ -38,7 +39,7 @@ def test_a_picture_is_stored_once(shared, tmp_path):
     root, own = shared
     image = next((own / "metadata/traj_a/img").iterdir())
     stored = set((root / "frames").iterdir())
-    store_picture(root, image, "again")
+    store_picture(root, image.read_bytes(), "again")
     assert set((root / "frames").iterdir()) == stored
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.packed.writing import unpack_set
 from infthor_eval.formats.step_log import read_steps
 from infthor_eval.formats.twins import read_pairs, write_pairs
 from infthor_eval.generation.bundle import (
@@ -17,6 +18,7 @@ from infthor_eval.generation.bundle import (
     build_twins,
     copy_compactly,
     differing_files,
+    digests_of,
     read_manifest,
 )
 from infthor_eval.nieh.scoring import score
@@ -25,6 +27,14 @@ from infthor_eval.storage.folders import packaged_folder
 from infthor_eval.workers import WorkerSettings
 
 BUNDLED = packaged_folder("sets/nieh_mini_twins")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """The set as a folder."""
+    out = tmp_path_factory.mktemp("twins")
+    unpack_set(BUNDLED, out, skip_damaged=False)
+    return out
 
 
 @pytest.fixture(scope="module")
@@ -41,9 +51,6 @@ def test_the_bundled_twins_are_many_and_small(pairs):
     assert max(kinds.values()) <= 0.3 * kinds.total()
     rooms = {pair.floor_plan.rpartition("-")[0] for pair in pairs}
     assert rooms == {"kitchen", "living-room", "bedroom", "bathroom"}
-    both = (BUNDLED, BUNDLED.with_name("nieh_mini"))
-    files = [path for folder in both for path in folder.rglob("*") if path.is_file()]
-    assert sum(path.stat().st_size for path in files) <= 20e6
 
 
 def test_rooms_are_those_of_no_other_set_and_none_that_is_held_out():
@@ -77,22 +84,16 @@ def test_frames_that_are_equal_in_both_worlds_have_equal_digests(pairs):
             assert compared.same == (one.load().tobytes() == other.load().tobytes())
 
 
-def test_nothing_is_there_that_no_question_needs(pairs):
+def test_nothing_is_there_that_no_question_needs(pairs, folder):
     worlds = {name for pair in pairs for name in pair.traj_ids}
-    assert {path.name for path in (BUNDLED / "metadata").iterdir()} == worlds
-    data = NiehSet(BUNDLED)
-    used = {frame for world in worlds for frame in data.frames(world)}
-    layers = {frame.path.name for frame in used}
-    layers |= {patch.path.name for frame in used for patch in frame.patches}
-    assert {path.name for path in (BUNDLED / "frames").iterdir()} == layers
+    assert {path.name for path in (folder / "metadata").iterdir()} == worlds
+    data = NiehSet(folder)
+    used = {frame.name for world in worlds for frame in data.frames(world)}
+    assert {path.name for path in (folder / "frames").iterdir()} == used
 
 
-def test_the_manifest_has_the_digests_of_the_twins_files():
-    files = _manifest().files
-    assert {name: digest_of_file(BUNDLED / name) for name in files} == files
-    there = {str(path.relative_to(BUNDLED)) for path in BUNDLED.rglob("*") if path.is_file()}
-    card = {"README.md", "croissant.json", "card.png"}
-    assert there == {*files, *card, MANIFEST}
+def test_the_manifest_has_the_digests_of_the_twins_files(folder):
+    assert digests_of(folder) == _manifest().files
 
 
 def test_the_choice_of_questions_is_within_its_limit(pairs):
@@ -102,23 +103,23 @@ def test_the_choice_of_questions_is_within_its_limit(pairs):
     assert max(by_base.values()) <= _manifest().per_trajectory
 
 
-def _part(pairs, out):
+def _part(folder, pairs, out):
     """A set with the worlds of the first base trajectory alone."""
     first = [pair for pair in pairs if pair.base == pairs[0].base]
     for pair in first:
         for name in pair.traj_ids:
-            shutil.copytree(BUNDLED / "metadata" / name, out / "metadata" / name)
-    (out / "frames").symlink_to(BUNDLED / "frames")
+            shutil.copytree(folder / "metadata" / name, out / "metadata" / name)
+    (out / "frames").symlink_to(folder / "frames")
     for file in ("set.json", "qa_set_twins.csv"):
-        shutil.copy(BUNDLED / file, out)
+        shutil.copy(folder / file, out)
     write_pairs(out, first)
     return first
 
 
-def test_a_compact_copy_has_the_same_frames(pairs, tmp_path):
+def test_a_compact_copy_has_the_same_frames(folder, pairs, tmp_path):
     source = tmp_path / "source"
     source.mkdir()
-    first = _part(pairs, source)
+    first = _part(folder, pairs, source)
     copies = []
     for name in ("one", "other"):
         (tmp_path / name).mkdir()
@@ -136,7 +137,7 @@ def test_a_compact_copy_has_the_same_frames(pairs, tmp_path):
 
 
 @pytest.mark.slow
-def test_twins_are_built_again_byte_for_byte(pairs, tmp_path):
+def test_twins_are_built_again_byte_for_byte(folder, pairs, tmp_path):
     """Of one trajectory: the same worlds, of which another choice of questions is made. Not of
     the two that sets/README.md names, whose episodes are drawn otherwise today."""
     manifest = _manifest()
@@ -153,5 +154,5 @@ def test_twins_are_built_again_byte_for_byte(pairs, tmp_path):
     for name in common:
         assert made[name].traj_ids == bundled[name].traj_ids
         for world in made[name].traj_ids:
-            built_again = tmp_path / "one" / "metadata" / world
-            assert read_steps(built_again) == read_steps(BUNDLED / "metadata" / world)
+            built_again = NiehSet(tmp_path / "one").folder(world)
+            assert read_steps(built_again) == read_steps(folder / "metadata" / world)

@@ -1,8 +1,13 @@
-"""The bundled set's trajectories by their scene: their seeds change when the set is made again."""
+"""The bundled set as a folder, and its trajectories by their scene: seeds may change."""
 
+from infthor_eval.formats.packed.writing import unpack_set
 from infthor_eval.storage.folders import packaged_folder
+from infthor_eval.storage.scratch import ScratchFolder
 
-BUNDLED = packaged_folder("sets/nieh_mini")
+PACKED = packaged_folder("sets/nieh_mini")
+_scratch = ScratchFolder()
+BUNDLED = _scratch.path
+unpack_set(PACKED, BUNDLED, skip_damaged=False)
 
 
 def bundled_name(scene: str) -> str:

@@ -58,7 +58,7 @@ def _write_world(
         shade = (60 * number, *(own if shared is None else (30 * shared, 0)))
         file = root / "drawn.png"
         Image.new("RGB", (size, size), shade).save(file)
-        pictures.append(store_picture(root, file, "test"))
+        pictures.append(store_picture(root, file.read_bytes(), "test"))
         file.unlink()
     write_frame_names(folder, pictures)
     entries = [

@@ -55,7 +55,7 @@ def _write_world(root: Path, world: str, thing: str, shades: tuple[int, int]) ->
         green = shades[1] if index in DIFFERING else 90
         picture = root / "picture.png"
         Image.new("RGB", (160, 160), (red, green, shades[0])).save(picture)
-        names.append(store_picture(root, picture, "test"))
+        names.append(store_picture(root, picture.read_bytes(), "test"))
         picture.unlink()
         step = {"img_idx": index, "img_filename": f"{index}.png", "step": index, "object_log": {}}
         steps.append({**step, "action": f"Pass {thing}"})

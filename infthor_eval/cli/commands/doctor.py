@@ -28,6 +28,7 @@ from rich.text import Text
 from infthor_eval.cli.help import ExampleCommand
 from infthor_eval.cli.options.values import (
     PATH,
+    SET,
     ModelArgs,
     ModelList,
     ModelSpec,
@@ -81,7 +82,7 @@ class Check(msgspec.Struct, frozen=True):
 )
 @click.option(
     "--data",
-    type=PATH,
+    type=SET,
     help="Read this NIEH set whole instead, and say what it has and what can be asked.",
 )
 @click.option(

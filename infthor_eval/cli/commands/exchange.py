@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from infthor_eval.cli.help import ExampleCommand
-from infthor_eval.cli.options.values import PATH, output_option
+from infthor_eval.cli.options.values import PATH, SET, output_option
 from infthor_eval.exports.registry import FORMATS
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ _RELATIONSHIPS = ("first_party", "third_party", "collaborative", "other")
 )
 @click.option("--out", type=PATH, required=True, help="Folder of the files.")
 @click.option(
-    "--data", type=PATH, metavar="SET", help="Folder of the question set, if the runs name none."
+    "--data", type=SET, metavar="SET", help="Folder of the question set, if the runs name none."
 )
 @click.option(
     "--frames", is_flag=True, help="Write the frames of requests too, where there is a place."
@@ -92,7 +92,7 @@ def _check_hub_name(option: str, name: str | None) -> None:
 )
 @click.argument("logs", metavar="LOG...", nargs=-1, required=True, type=PATH)
 @click.option(
-    "--data", type=PATH, metavar="SET", help="Folder of the NIEH set that the replies are about."
+    "--data", type=SET, metavar="SET", help="Folder of the NIEH set that the replies are about."
 )
 @click.option(
     "--model",

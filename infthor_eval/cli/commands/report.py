@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from infthor_eval.cli.help import ExampleCommand
-from infthor_eval.cli.options.values import PATH, WholeNumber
+from infthor_eval.cli.options.values import PATH, SET, WholeNumber
 
 if TYPE_CHECKING:
     from rich.progress import Progress
@@ -38,7 +38,7 @@ _FOLDER = Path("results/figures")
 )
 @click.option(
     "--data",
-    type=PATH,
+    type=SET,
     help="Folder of the question set or the trajectories, if the runs do not name it.",
 )
 @click.option(

@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from infthor_eval.cli.help import ExampleCommand, ExampleGroup
-from infthor_eval.cli.options.values import PATH
+from infthor_eval.cli.options.values import PATH, SET
 
 
 @click.group("table", cls=ExampleGroup, example="infthor-eval table 4 SET")
@@ -14,7 +14,7 @@ def command() -> None:
 
 
 @command.command("4", cls=ExampleCommand, example="infthor-eval table 4 SET")
-@click.argument("set_folder", metavar="SET", type=PATH)
+@click.argument("set_folder", metavar="SET", type=SET)
 def table4(set_folder: Path) -> None:
     """Compute the paper's Table 4 from the scores in the published question files, beside the
     printed table.

@@ -17,7 +17,7 @@ import msgspec
 from infthor_eval.cli.help import SuiteOption
 from infthor_eval.cli.options.config import comes_from_file, config_option
 from infthor_eval.cli.options.values import (
-    PATH,
+    SET,
     FiniteFloat,
     ModelArgs,
     ModelList,
@@ -64,7 +64,11 @@ _OPTIONS = (
         help="Task or group names with commas (see `ls tasks`).",
     ),
     include_option,
-    click.option("--data", type=PATH, help="Folder of the data set."),
+    click.option(
+        "--data",
+        type=SET,
+        help="Folder of the data set, or a packed one on the hub: hf://OWNER/NAME.",
+    ),
     click.option(
         "--model-args",
         type=ModelArgs(),

@@ -12,6 +12,23 @@ from infthor_eval.errors import UsageError, unknown_name
 from model_adapters.options.parsing import read_pairs
 
 PATH = click.Path(path_type=Path)
+
+
+class SetPath(click.ParamType):
+    """The folder or file of a set, or one on the hub (hf://OWNER/NAME)."""
+
+    name = "path"
+
+    def convert(
+        self, value: Any, _param: click.Parameter | None, _context: click.Context | None
+    ) -> Path:
+        """Return the folder; of a set on the hub, the one that stands for it."""
+        from infthor_eval.formats.packed.hub import set_folder
+
+        return set_folder(value)
+
+
+SET = SetPath()
 SCENE_KINDS = ("kitchen", "living-room", "bedroom", "bathroom", "house")  # procedural: KIND-SEED
 _LARGEST = 2**63 - 1  # the largest integer of a run's JSON
 

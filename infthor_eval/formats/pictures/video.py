@@ -17,8 +17,9 @@ from PIL import Image
 
 from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.packed.paths import SetPath
 from infthor_eval.formats.reading import require_file
-from infthor_eval.storage.digests import digest_of_file
+from infthor_eval.storage.digests import digest
 from infthor_eval.storage.files import writing_hint
 from infthor_eval.storage.folders import user_cache
 from infthor_eval.storage.scratch import ScratchFolder
@@ -76,7 +77,7 @@ def sample_positions(n_frames: int, film_fps: float, fps: float) -> tuple[int, .
     return tuple(round(rank * (n_frames - 1) / (n - 1)) for rank in range(n)) or (0,)
 
 
-def read_video(path: Path, fps: float) -> Video:
+def read_video(path: SetPath, fps: float) -> Video:
     """Return the frames that are sampled from a film at this rate.
 
     OpenCV decodes the film at the first call for its content and the rate. The name of the cache
@@ -86,8 +87,8 @@ def read_video(path: Path, fps: float) -> Video:
 
     require_file(path, _HINT)
     with wrap_errors(f"{path}: cannot be read", _HINT):
-        digest = digest_of_file(path)
-    folder = user_cache("video_frames") / f"{digest}-spread-{fps:g}fps-opencv{cv2.__version__}"
+        content = digest(path.read_bytes())
+    folder = user_cache("video_frames") / f"{content}-spread-{fps:g}fps-opencv{cv2.__version__}"
     if not _is_complete(folder):
         with wrap_errors(f"{folder}: cannot be written", writing_hint(", or set XDG_CACHE_HOME")):
             _extract(path, fps, folder)
@@ -103,14 +104,17 @@ def _is_complete(folder: Path) -> bool:
     )
 
 
-def _extract(path: Path, fps: float, folder: Path) -> None:
+def _extract(path: SetPath, fps: float, folder: Path) -> None:
     """Decode the frames into a temporary folder and rename it when it is complete."""
     shutil.rmtree(folder, ignore_errors=True)
     folder.parent.mkdir(parents=True, exist_ok=True)
     with ScratchFolder(folder.parent) as scratch:
         frames = scratch / "frames"
         frames.mkdir()
-        _decode(path, fps, frames)
+        film = path if isinstance(path, Path) else scratch / path.name
+        if not isinstance(path, Path):  # OpenCV reads files alone
+            film.write_bytes(path.read_bytes())
+        _decode(film, fps, frames)
         try:
             frames.rename(folder)
         except OSError:

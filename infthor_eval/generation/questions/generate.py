@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from infthor_eval.errors import DataError, InfthorError, UsageError, wrap_errors
+from infthor_eval.formats.packed.paths import SetPath, metadata_folder
 from infthor_eval.formats.question import ABSENCE, Question
 from infthor_eval.formats.set_info import simulator_of
 from infthor_eval.formats.step_log import read_steps
@@ -170,9 +171,9 @@ def _object_types(
     share: float,
     result: GeneratedQuestions,
     begin: Callable[[str, int], Callable[[], object]],
-) -> dict[Path, frozenset[str]]:
+) -> dict[SetPath, frozenset[str]]:
     """Return the object types of each trajectory; those that cannot be read are skipped."""
-    types: dict[Path, frozenset[str]] = {}
+    types: dict[SetPath, frozenset[str]] = {}
     folders = trajectory_folders(folder)
     advance = begin("trajectories read", len(folders))
     for path in folders:
@@ -272,25 +273,25 @@ def _share_out(
     return {jobs[number].asked: results[number] for number in sorted(results)}
 
 
-def _read_history(path: Path, share: float, moment: int | None = None) -> TrajectoryHistory:
+def _read_history(path: SetPath, share: float, moment: int | None = None) -> TrajectoryHistory:
     with naming_inconsistency(path):
         steps = read_steps(path)
         return TrajectoryHistory(path.name, steps if moment is None else steps[: moment + 1], share)
 
 
-def naming_inconsistency(path: Path) -> AbstractContextManager[None]:
+def naming_inconsistency(path: SetPath) -> AbstractContextManager[None]:
     """Turn errors of a log that has the documented form but inconsistent content into ours."""
     return wrap_errors(
         f"{path}: its log is inconsistent", "replay the trajectory again", catch=_INCONSISTENT
     )
 
 
-def trajectory_folders(folder: Path) -> list[Path]:
+def trajectory_folders(folder: Path) -> list[SetPath]:
     """Return the folders of a set's trajectories, sorted; none is an error."""
-    metadata = folder / "metadata"
-    folders: list[Path] = []
-    if metadata.is_dir():
-        folders = sorted(path for path in metadata.glob("*/") if not path.name.startswith("."))
+    metadata = metadata_folder(folder)
+    paths: list[SetPath] = [*metadata.iterdir()] if metadata.is_dir() else []
+    folders = [path for path in paths if path.is_dir() and not path.name.startswith(".")]
+    folders.sort(key=lambda path: path.name)
     if not folders:
         raise DataError(f"{metadata}: has no trajectory; replay some into this set first")
     return folders

@@ -56,7 +56,8 @@ class Replayed:
             for file in _COPIED:
                 shutil.copyfile(self.folder / file, folder / file)
             (folder / "traj_data.json").write_bytes(encode_trajectory(world))
-            write_frame_names(folder, [store_picture(out, image, name) for image in pictures])
+            content = (picture.read_bytes() for picture in pictures)
+            write_frame_names(folder, [store_picture(out, one, name) for one in content])
 
 
 class Replays:

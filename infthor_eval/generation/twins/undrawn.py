@@ -10,13 +10,14 @@ from functools import partial
 from pathlib import Path
 
 import msgspec
+import pyarrow as pa
 from msgspec.structs import replace
 
-from infthor_eval.errors import DataError, SimulatorError
+from infthor_eval.errors import DataError, SimulatorError, wrap_errors
 from infthor_eval.formats.nieh_set import NiehSet
-from infthor_eval.formats.reading import read_json, read_text
+from infthor_eval.formats.reading import read_json
 from infthor_eval.formats.step_log import read_steps
-from infthor_eval.formats.trajectory import Trajectory, TrajectorySource, iter_trajectories
+from infthor_eval.formats.trajectory import Trajectory, TrajectorySource, read_trajectory
 from infthor_eval.formats.twins import TwinPair, read_pairs, write_pairs
 from infthor_eval.formats.undrawn import DIGESTS, SET_INFO, WORLDS
 from infthor_eval.generation.simulator_jobs import (
@@ -28,12 +29,12 @@ from infthor_eval.generation.twins.comparison import Difference
 from infthor_eval.generation.twins.replays import WORLD, Replays
 from infthor_eval.generation.twins.rewriting import first_subgoals, without_traces
 from infthor_eval.storage.digests import digest
-from infthor_eval.storage.files import write_packed
 from infthor_eval.thor.launch import embedded_launch
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.workers import WorkerSettings, run_jobs
 
 _HINT = "install infthor-eval again"
+_LEVEL = 19  # of zstd
 
 
 def pack_worlds(source: Path, out: Path) -> None:
@@ -53,7 +54,8 @@ def pack_worlds(source: Path, out: Path) -> None:
             lines.append(msgspec.json.encode(world))
             digests[name] = _digest(data, name, n_frames)
         pairs.append(replace(pair, frames=pair.frames[:n_frames]))
-    write_packed(out / WORLDS.removesuffix(".xz"), b"\n".join(lines) + b"\n")
+    codec = pa.Codec("zstd", compression_level=_LEVEL)
+    (out / WORLDS).write_bytes(codec.compress(b"\n".join(lines) + b"\n", asbytes=True))
     (out / DIGESTS).write_bytes(msgspec.json.format(msgspec.json.encode(digests), indent=1) + b"\n")
     write_pairs(out, pairs)
     copy_questions(source, out, data.files)
@@ -138,12 +140,17 @@ def expected_digests(packed: Path) -> dict[str, str]:
 
 def _worlds(packed: Path) -> Iterator[Trajectory]:
     path = packed / WORLDS
-    for number, line in enumerate(read_text(path, _HINT).splitlines(), 1):
-        yield TrajectorySource(path, number, line.encode()).read()
+    with (
+        wrap_errors(f"{path}: cannot be unpacked", _HINT, catch=(OSError, ValueError)),
+        pa.input_stream(str(path)) as file,
+    ):
+        lines = file.read().splitlines()
+    for number, line in enumerate(lines, 1):
+        yield TrajectorySource(path, number, line).read()
 
 
 def _up_to_last_moment(data: NiehSet, name: str, pair: TwinPair) -> Trajectory:
-    (world,) = iter_trajectories(data.folder(name) / "traj_data.json")
+    world = read_trajectory(data.folder(name) / "traj_data.json")
     last = max(question.moment or 0 for question in pair.questions)
     n_high = world.plan.low_actions[last - 1].high_idx + 1
     return without_traces(first_subgoals(world, n_high), name)

@@ -16,7 +16,7 @@ from infthor_eval.nieh.options import NiehSettings
 from infthor_eval.nieh.prompts import PUBLISHED_MAIN, question_text
 from infthor_eval.quantities import Share, Total
 from infthor_eval.settings import Setting
-from infthor_eval.storage.digests import digest_of_file, fingerprint
+from infthor_eval.storage.digests import digest, fingerprint
 
 ContextPart = str | FrameRef | Video
 _Fps = Annotated[float, Meta(gt=0, le=FILM_FPS)]
@@ -210,6 +210,6 @@ def trajectories_identity(data: NiehSet, _settings: ContextSettings) -> dict[str
     files = {traj_id: path for traj_id in ids if (path := data.outline_file(traj_id)) is not None}
     return {
         "trajectories": fingerprint(
-            {traj_id: digest_of_file(path) for traj_id, path in files.items()}
+            {traj_id: digest(path.read_bytes()) for traj_id, path in files.items()}
         )
     }

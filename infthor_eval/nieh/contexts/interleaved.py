@@ -3,11 +3,11 @@
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import takewhile
-from pathlib import Path
 
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.outline import Outline
+from infthor_eval.formats.packed.paths import SetPath
 from infthor_eval.formats.question import Question, SkippedQuestion
 from infthor_eval.formats.reading import read_text
 from infthor_eval.nieh.contexts.base import ContextPart, ContextSettings, QuestionVariant
@@ -121,5 +121,5 @@ def plans_parts(
     return [part for part in _with_frames(marked, sample, frames) if part]
 
 
-def _sequence_text(folder: Path) -> str:
+def _sequence_text(folder: SetPath) -> str:
     return read_text(folder / "traj.txt", "replay the trajectory again")

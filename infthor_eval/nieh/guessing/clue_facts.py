@@ -11,7 +11,7 @@ from infthor_eval.errors import DataError
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
 from infthor_eval.formats.step_log import Step, read_steps
-from infthor_eval.formats.trajectory import iter_trajectories
+from infthor_eval.formats.trajectory import read_trajectory
 
 _LAST_PIXEL = 299
 _LARGE = 90  # pixels from which on an object counts as in view, as for questions
@@ -58,7 +58,7 @@ def read_scenes(data: NiehSet) -> Mapping[str, str]:
     for traj_id in {question.traj_id for question in data.questions}:
         path = data.outline_file(traj_id)
         if path is not None:
-            scenes[traj_id] = next(iter_trajectories(path)).scene.floor_plan
+            scenes[traj_id] = read_trajectory(path).scene.floor_plan
     return scenes
 
 

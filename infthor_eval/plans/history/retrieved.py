@@ -103,6 +103,7 @@ def _steps_of_images(trajectory: Trajectory) -> Mapping[str, int]:
 
 def _resized(frame: FrameRef) -> FrameRef:
     """Return a frame in the published size, in a file beside it, which ends with the episode."""
+    assert isinstance(frame.path, Path)  # of a running episode
     path = frame.path.with_name(f"{Path(frame.name).stem}-{_SIDE}.png")
     if not path.is_file():
         image = frame.load().resize((_SIDE, _SIDE), resample=Image.Resampling.LANCZOS)

@@ -6,9 +6,11 @@ from pathlib import Path
 from typing import Any
 
 from infthor_eval.errors import wrap_errors
+from infthor_eval.formats.packed.paths import table_configs
 from infthor_eval.report.cards.facts import About, FileFact, SetFacts
 from infthor_eval.report.cards.statements import description, statements
 
+_PARQUET = "application/vnd.apache.parquet"
 _CONTEXT: dict[str, Any] = {
     "@language": "en",
     "@vocab": "https://schema.org/",
@@ -138,13 +140,17 @@ def _distribution(facts: SetFacts) -> Iterator[dict[str, Any]]:
         yield _file_object(file, "text/csv", "questions")
     if facts.pairs_file is not None:
         yield _file_object(facts.pairs_file, "application/jsonlines", "pairs of worlds")
-    if facts.contents.frames:
+    tables = table_configs(facts.data.directory)
+    for table in tables:
+        text = f"table of {table['config_name']}"
+        yield _file_set(table["config_name"], _PARQUET, [table["data_files"]], text)
+    if facts.contents.frames and not tables:
         folder = "frames/*.png" if facts.pairs_file else "metadata/*/*/*.*"
         yield _file_set("frames", "image/png", [folder], "frames of the trajectories")
         yield _file_set(
             "logs",
             "application/json",
-            ["metadata/*/*.json", "metadata/*/*.json.xz"],
+            ["metadata/*/*.json"],
             "state of all objects at each step, and the actions",
         )
 

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping
 
 import yaml
 
+from infthor_eval.formats.packed.paths import table_configs
 from infthor_eval.nieh.guessing.audit_tables import guessers_table
 from infthor_eval.report.cards.facts import About, SetFacts
 from infthor_eval.report.cards.statements import RAI_FIELDS, description, statements
@@ -36,6 +37,7 @@ def card(facts: SetFacts, about: About, pictures: Mapping[str, str]) -> str:
 
 def _front_matter(facts: SetFacts, about: About) -> str:
     size = next((name for limit, name in _SIZES if facts.n_questions < limit), "n>10K")
+    in_csv = {"config_name": "default", "data_files": [file.path for file in facts.question_files]}
     fields = {
         "license": about.licence.lower(),
         "language": ["en"],
@@ -43,9 +45,7 @@ def _front_matter(facts: SetFacts, about: About) -> str:
         "task_categories": ["visual-question-answering"],
         "size_categories": [size],
         "tags": ["embodied-ai", "long-context", "episodic-memory", "ai2-thor"],
-        "configs": [
-            {"config_name": "default", "data_files": [file.path for file in facts.question_files]}
-        ],
+        "configs": table_configs(facts.data.directory) or [in_csv],
     }
     return f"---\n{yaml.safe_dump(fields, sort_keys=False, allow_unicode=True)}---"
 
@@ -91,7 +91,13 @@ def _files(facts: SetFacts, about: About) -> Iterator[str]:
     names = [f"`{file.path}`" for file in facts.question_files]
     if facts.pairs_file is not None:
         names.append(f"`{facts.pairs_file.path}`")
+    tables = [config["config_name"] for config in table_configs(facts.data.directory)]
     folders = " and `metadata/` (frames, logs)" if facts.contents.frames else ""
+    if tables:
+        folders = (
+            f" and the same in Parquet ({', '.join(tables)}), which "
+            '`datasets.load_dataset(FOLDER, "questions")` loads and `infthor-eval` runs on'
+        )
     yield f"{', '.join(names)}{folders}; `croissant.json` describes them."
     by = f", written by infthor-eval {facts.written_by}" if facts.written_by else ""
     lines = [f"- Version {about.version} of {about.published}{by}", f"- Licence: {about.licence}"]

@@ -15,6 +15,7 @@ import msgspec
 from infthor_eval.errors import DataError, InfthorError, UsageError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.packed.paths import SetPath
 from infthor_eval.formats.question import Question
 from infthor_eval.formats.step_log import LoggedPose, Step, read_steps
 from infthor_eval.formats.twins import TwinPair
@@ -61,7 +62,7 @@ def find_timelines(runs: Sequence[Run], data: Path | None, thumbnails: Thumbnail
         (choice.frames[at] for choice in choices for at in sorted(choice.others)),
         (choice.frames[at] for choice in choices for at in sorted(choice.recalled)),
     )
-    thumbnails.add_all({_picture_key(frame): frame.load for frame in wanted})
+    thumbnails.add_all({str(frame.path): frame.load for frame in wanted})
     notes = [f"{task}: no frames are shown: {problem}" for task, problem in sets.problems.items()]
     facts = Numbered[FrameFacts]()
     timelines = {key: _timeline(choice, thumbnails, facts) for key, choice in chosen.items()}
@@ -99,9 +100,9 @@ class _TrajectoryFacts:
     """What the logs of trajectories say of their frames, each log read once."""
 
     def __init__(self) -> None:
-        self._facts: dict[Path, Sequence[FrameFacts]] = {}  # by the trajectory's folder
+        self._facts: dict[SetPath, Sequence[FrameFacts]] = {}  # by the trajectory's folder
 
-    def read(self, folder: Path) -> Sequence[FrameFacts]:
+    def read(self, folder: SetPath) -> Sequence[FrameFacts]:
         if folder not in self._facts:
             self._facts[folder] = _read_frame_facts(folder)
         return self._facts[folder]
@@ -153,7 +154,7 @@ def _timeline(
         known = msgspec.structs.replace(choice.facts[index], changed=choice.changed.get(index, ()))
         return TimelineFrame(
             index,
-            thumbnails.number(_picture_key(choice.frames[index])),
+            thumbnails.number(str(choice.frames[index].path)),
             index in choice.clues,
             index in choice.changed,
             facts.number(known),
@@ -169,11 +170,7 @@ def _timeline(
     return Timeline(len(choice.frames), frames, note, recalled)
 
 
-def _picture_key(frame: FrameRef) -> str:
-    return str(frame.path.with_name(frame.name))
-
-
-def _read_frame_facts(folder: Path) -> Sequence[FrameFacts]:
+def _read_frame_facts(folder: SetPath) -> Sequence[FrameFacts]:
     """Return what the log of a trajectory's folder says of each frame, in time order."""
     return [_facts(step) for step in sorted(read_steps(folder), key=lambda step: step.img_idx)]
 

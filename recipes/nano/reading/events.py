@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from itertools import pairwise
-from pathlib import Path
 
 from infthor_eval.formats.object_ids import object_type_of
+from infthor_eval.formats.packed.paths import SetPath
 from infthor_eval.formats.step_log import iter_object_states, read_steps
 from infthor_eval.household.wording import canonical_type
 
@@ -43,7 +43,7 @@ class Happening:
     type: str
 
 
-def read_events(folder: Path) -> list[Happening]:
+def read_events(folder: SetPath) -> list[Happening]:
     """Read the events of a replayed trajectory, in order.
 
     Args:

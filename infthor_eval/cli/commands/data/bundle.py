@@ -51,7 +51,7 @@ def command(manifest: Path, out: Path, **workers: Any) -> int:
             built, lines = _build_questions(expected, out, bar.advance)
         else:
             built, lines = _build_twins(expected, out, worker_settings, bar.advance)
-    size = sum((out / name).stat().st_size for name in built.files)
+    size = sum(path.stat().st_size for path in out.iterdir() if path.is_file())
     print_line(f"{lines[0]}, {size / 1e6:.1f} MB: {out}")
     print_line(lines[1])
     if not expected.files:

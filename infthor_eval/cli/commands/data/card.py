@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from infthor_eval.cli.help import ExampleCommand
-from infthor_eval.cli.options.values import PATH
+from infthor_eval.cli.options.values import PATH, SET
 
 _PICTURE = "card.png"
 _DAY = re.compile(r"\d{4}-\d{2}-\d{2}")
@@ -29,7 +29,7 @@ def _read_day(_context: click.Context, _option: click.Parameter, text: str | Non
     cls=ExampleCommand,
     example="infthor-eval card my_twins --licence CC-BY-4.0 --creator Me",
 )
-@click.argument("set_folder", metavar="SET", type=PATH)
+@click.argument("set_folder", metavar="SET", type=SET)
 @click.option("--licence", required=True, metavar="ID", help="SPDX identifier: CC-BY-4.0, MIT.")
 @click.option("--name", metavar="TEXT", help="Name of the set; default: that of its folder.")
 @click.option("--set-version", metavar="TEXT", default="1.0.0", show_default=True)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from infthor_eval.cli.help import ExampleCommand
-from infthor_eval.cli.options.values import PATH, FiniteFloat, WholeNumber, floor_plans_option
+from infthor_eval.cli.options.values import PATH, SET, FiniteFloat, WholeNumber, floor_plans_option
 from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
 from infthor_eval.errors import UsageError
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 @click.command(
     "questions", cls=ExampleCommand, example="infthor-eval questions SET --out SET/qa_set_mine.csv"
 )
-@click.argument("folder", metavar="SET", type=PATH)
+@click.argument("folder", metavar="SET", type=SET)
 @click.option("--out", required=True, type=PATH, help="CSV file to write.")
 @click.option(
     "--seed", type=WholeNumber(0), default=0, show_default=True, help="Seed of every choice."
@@ -116,7 +116,7 @@ def questions(
 @click.command(
     "moments", cls=ExampleCommand, example="infthor-eval moments SET --out SET/moments.csv"
 )
-@click.argument("folder", metavar="SET", type=PATH)
+@click.argument("folder", metavar="SET", type=SET)
 @click.option("--out", required=True, type=PATH, help="CSV file to write.")
 @click.option(
     "--trajectories", type=PATH, help="Folder of the trajectories, if they are not in the set."

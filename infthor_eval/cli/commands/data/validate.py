@@ -10,7 +10,7 @@ from msgspec.structs import replace
 
 from infthor_eval.cli.help import ExampleCommand
 from infthor_eval.cli.options.run import RunOptions
-from infthor_eval.cli.options.values import PATH, ModelList, ModelSpec, WholeNumber
+from infthor_eval.cli.options.values import PATH, SET, ModelList, ModelSpec, WholeNumber
 from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
 from infthor_eval.cli.progress.notes import print_note, prints_as_notes
 from infthor_eval.cli.progress.runs import execute_runs
@@ -37,7 +37,7 @@ from infthor_eval.runs import RunOutcome, RunRequest, RunSummary, Suite, prepare
     cls=ExampleCommand,
     example="infthor-eval validate SET --model A,B,C,D --out VALIDATED",
 )
-@click.argument("set_folder", metavar="SET", type=PATH)
+@click.argument("set_folder", metavar="SET", type=SET)
 @click.option(
     "--model",
     "--models",

@@ -1,0 +1,265 @@
+"""The Parquet tables of a packed set: their columns, and reading them safely.
+
+A table is in shards, `TABLE-00000-of-00002.parquet`. Rows of others are named by shard, row group
+and row, so that a reader that has a set on a server fetches what it shows and no more. Pictures and
+logs of one trajectory, or of all worlds of one base, are in row groups of their own.
+"""
+
+import re
+from collections import OrderedDict
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from threading import Lock
+from typing import BinaryIO, Protocol
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from infthor_eval.errors import DataError, wrap_errors
+from infthor_eval.storage.limits import FILE_MB
+
+_IMAGE = pa.struct({"bytes": pa.binary(), "path": pa.string()})
+_ROWS = {"shard": pa.int32(), "row_group": pa.int32()}
+_PLACE = {**_ROWS, "row": pa.int32()}
+_POSE = ("x", "y", "z", "rotation", "horizon")
+_TEXTS = pa.list_(pa.string())
+SCHEMAS = {
+    "questions": pa.schema(
+        {
+            "id": pa.string(),
+            "traj_id": pa.string(),
+            "question": pa.string(),
+            "answer": _TEXTS,
+            "gt_img_idx": pa.list_(pa.int64()),
+            "question_type": pa.string(),
+            "absence": pa.bool_(),
+            "moment": pa.int64(),
+            "pair": pa.string(),
+            "fact": pa.string(),
+            "file": pa.string(),
+            "clue_frames": pa.list_(_IMAGE),
+        }
+    ),
+    "frames": pa.schema({"digest": pa.string(), "image": _IMAGE}),
+    "steps": pa.schema(
+        {
+            "traj_id": pa.string(),
+            "img_idx": pa.int64(),
+            "file": pa.string(),
+            "frame": pa.string(),
+            "n_bytes": pa.int64(),
+            "width": pa.int32(),
+            "height": pa.int32(),
+            **_PLACE,
+            "action": pa.string(),
+            "success": pa.bool_(),
+            **dict.fromkeys(_POSE, pa.float64()),
+            "log": pa.string(),
+        }
+    ),
+    "files": pa.schema({"traj_id": pa.string(), "name": pa.string(), "content": pa.binary()}),
+    "trajectories": pa.schema(
+        {
+            "traj_id": pa.string(),
+            "scene": pa.string(),
+            "base": pa.string(),
+            "n_frames": pa.int64(),
+            **_ROWS,
+            "files": pa.list_(
+                pa.struct(
+                    {"name": pa.string(), "n_bytes": pa.int64(), "digest": pa.string(), **_PLACE}
+                )
+            ),
+        }
+    ),
+    "twins": pa.schema(
+        {
+            "id": pa.string(),
+            "kind": pa.string(),
+            "scene": pa.string(),
+            "base": pa.string(),
+            "traj_ids": _TEXTS,
+            "types": _TEXTS,
+            "changed": _TEXTS,
+            "differing_frames": pa.list_(pa.int64()),
+            "questions": pa.list_(
+                pa.struct({"question": pa.string(), "answers": pa.list_(_TEXTS)})
+            ),
+        }
+    ),
+}
+READ = ("trajectories", "steps", "frames", "files")  # by us; the others are to be looked at
+_SHARD = re.compile(r"([a-z]+)-(\d{5})-of-(\d{5})\.parquet")
+_LARGEST_GROUP = 2**20  # rows
+_KEPT = 6  # row groups, decoded
+HINT = "pack the set again, or save what is whole: infthor-eval unpack --skip-damaged"
+
+# What pyarrow raises on damaged and forged files. RuntimeError: thrift's.
+DAMAGED = (
+    pa.ArrowException,
+    OSError,
+    ValueError,
+    LookupError,
+    TypeError,
+    ArithmeticError,
+    MemoryError,
+    RuntimeError,
+)
+
+
+class Store(Protocol):
+    """Where the files of a packed set are."""
+
+    @property
+    def root(self) -> Path:
+        """Folder, for messages."""
+
+    @property
+    def failures(self) -> tuple[type[Exception], ...]:
+        """What is raised where a file is damaged, or cannot be had."""
+
+    def names(self) -> Sequence[str]:
+        """Return the names of its Parquet files."""
+
+    def open(self, name: str) -> BinaryIO | str:
+        """Return a file that can be read in parts, or its path."""
+
+    def kept(self, digest: str) -> Path | None:
+        """Return where a frame is kept once it was read; None where frames are here anyway."""
+
+
+@dataclass(frozen=True)
+class LocalStore:
+    """A folder of this machine."""
+
+    root: Path
+    failures: tuple[type[Exception], ...] = DAMAGED
+
+    def kept(self, digest: str) -> None:
+        """Return None: frames are here anyway."""
+
+    def names(self) -> Sequence[str]:
+        """Return the names of its Parquet files."""
+        return [path.name for path in self.root.glob("*.parquet")]
+
+    def open(self, name: str) -> str:
+        """Return a file's path."""
+        return str(self.root / name)
+
+
+def shard_name(table: str, shard: int, n_shards: int) -> str:
+    """Return the name of a table's file."""
+    return f"{table}-{shard:05d}-of-{n_shards:05d}.parquet"
+
+
+class Shards:
+    """The files of one table."""
+
+    def __init__(self, table: str, store: Store) -> None:
+        """Find them; none is opened.
+
+        Raises:
+            DataError: one is missing.
+        """
+        self._table = table
+        self._schema = SCHEMAS[table]
+        self._store = store
+        found = [match for name in store.names() if (match := _SHARD.fullmatch(name))]
+        own = sorted(match[0] for match in found if match[1] == table)
+        self._names = [shard_name(table, at, len(own)) for at in range(len(own))]
+        if own != self._names:
+            expected = own[-1].split("-of-")[-1].removesuffix(".parquet")
+            raise DataError(
+                f"{store.root}: has {len(own)} of {expected} files {table}-*.parquet; {HINT}"
+            )
+        self._files: dict[str, pq.ParquetFile] = {}
+        self._read: OrderedDict[tuple[object, ...], pa.Table] = OrderedDict()
+        self._lock = Lock()  # pyarrow's readers are not made for several threads
+
+    def check(self) -> None:
+        """Open all files.
+
+        Raises:
+            DataError: one cannot be opened, or has other columns.
+        """
+        for name in self._names:
+            self._open(name)
+
+    def groups(self) -> list[tuple[int, int]]:
+        """Return shard and number of each row group."""
+        counts = [self._open(name).num_row_groups for name in self._names]
+        return [(shard, group) for shard, n in enumerate(counts) for group in range(n)]
+
+    def read(self, shard: int, row_group: int, columns: Sequence[str]) -> pa.Table:
+        """Return columns of a row group.
+
+        Raises:
+            DataError: there is no such row group, it is too large, or damaged.
+        """
+        key = (shard, row_group, *columns)
+        with self._lock:
+            if key in self._read:
+                self._read.move_to_end(key)
+                return self._read[key]
+            self._read[key] = table = self._decode(shard, row_group, columns)
+            if len(self._read) > _KEPT:
+                self._read.popitem(last=False)
+            return table
+
+    def _decode(self, shard: int, row_group: int, columns: Sequence[str]) -> pa.Table:
+        if not 0 <= shard < len(self._names):
+            raise DataError(
+                f"{self._store.root}: file {shard} of {self._table} is not there; {HINT}"
+            )
+        path = self._store.root / self._names[shard]
+        file = self._open(self._names[shard])
+        if not 0 <= row_group < file.num_row_groups:
+            raise DataError(f"{path}: has no row group {row_group}; {HINT}")
+        failures = self._store.failures
+        with wrap_errors(f"{path}: row group {row_group} cannot be read", HINT, catch=DAMAGED):
+            group = file.metadata.row_group(row_group)
+        self._check_size(path, group)
+        with wrap_errors(f"{path}: row group {row_group} cannot be read", HINT, catch=failures):
+            table = file.read_row_group(row_group, columns=list(columns), use_threads=False)
+            table.validate(full=True)  # a forged file may have texts that are not UTF-8
+            return table
+
+    def _check_size(self, path: Path, group: pq.RowGroupMetaData) -> None:
+        """Refuse a row group that would fill the memory."""
+        columns = [group.column(at) for at in range(group.num_columns)]
+        # A long value in a dictionary can stand for a million; those that we write are not so
+        # encoded.
+        dictionaries = [
+            column.path_in_schema
+            for column in columns
+            if column.has_dictionary_page and column.physical_type == "BYTE_ARRAY"
+        ]
+        n_bytes = sum(column.total_uncompressed_size for column in columns)
+        n_bytes = max(n_bytes, group.total_byte_size)
+        if group.num_rows > _LARGEST_GROUP or n_bytes > FILE_MB.value * 2**20:
+            raise DataError(
+                f"{path}: a row group of {group.num_rows:,} rows and {n_bytes:,} bytes is too "
+                f"large; {FILE_MB.hint}"
+            )
+        if dictionaries:
+            raise DataError(f"{path}: {dictionaries[0]} is encoded by a dictionary; {HINT}")
+
+    def _open(self, name: str) -> pq.ParquetFile:
+        if name not in self._files:
+            path = self._store.root / name
+            failures = self._store.failures
+            with wrap_errors(f"{path}: not a Parquet file, or cut off", HINT, catch=failures):
+                file = pq.ParquetFile(self._store.open(name))
+                schema = file.schema_arrow
+            self._check_columns(path, schema)
+            self._files[name] = file
+        return self._files[name]
+
+    def _check_columns(self, path: Path, schema: pa.Schema) -> None:
+        for field in self._schema:
+            at = schema.get_field_index(field.name)
+            found = None if at < 0 else schema.field(at).type
+            if found != field.type:
+                what = "no such column" if found is None else f"{found}, not {field.type}"
+                raise DataError(f"{path}: column {field.name}: {what}; {HINT}")
