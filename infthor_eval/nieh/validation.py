@@ -19,6 +19,7 @@ import msgspec
 from infthor_eval.errors import DataError, UsageError, wrap_errors
 from infthor_eval.formats.csv_files import read_rows, unshield, write_sheet
 from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.packed.paths import frame_sources
 from infthor_eval.formats.qa_csv import write_questions
 from infthor_eval.formats.question import Question
 from infthor_eval.nieh.scoring import Scorer, scores
@@ -176,10 +177,10 @@ def read_decisions(path: Path) -> dict[str, str]:
 
 def check_output(out: Path, data: NiehSet) -> None:
     """Refuse an output folder that the validated set would damage, before the models run."""
-    if not (data.root / "metadata").is_dir():
+    if not (sources := frame_sources(data.root)):
         raise UsageError(
             f"{data.root}: has no metadata/, which a validated set links; give a set in the layout "
-            "of the published one"
+            "of the published one, or a packed one"
         )
     prepare_folder(out)
     if out.resolve() == data.root.resolve():
@@ -187,9 +188,10 @@ def check_output(out: Path, data: NiehSet) -> None:
             f"--out {out}: is the set itself, in which every question would be listed twice; give "
             "another"
         )
-    link = out / "metadata"
-    if os.path.lexists(link) and link.resolve() != (data.root / "metadata").resolve():
-        raise DataError(f"{link}: holds the frames of another set; give another --out")
+    for source in sources:
+        link = out / source.name
+        if os.path.lexists(link) and link.resolve() != source.resolve():
+            raise DataError(f"{link}: holds the frames of another set; give another --out")
     if (out / _INSPECTION).exists():
         read_decisions(out / _INSPECTION)
 
@@ -203,9 +205,10 @@ def write_validated_set(out: Path, data: NiehSet, verdicts: Verdicts) -> Path | 
     """
     with wrap_errors(f"{out}: cannot be written", "give another --out"):
         out.mkdir(parents=True, exist_ok=True)
-        link = out / "metadata"
-        if not link.exists():
-            link.symlink_to((data.root / "metadata").resolve(), target_is_directory=True)
+        for source in frame_sources(data.root):
+            link = out / source.name
+            if not link.exists():
+                link.symlink_to(source.resolve(), target_is_directory=source.is_dir())
         if (data.root / "set.json").is_file():
             shutil.copy(data.root / "set.json", out / "set.json")
         write_questions(out / "qa_set_validated.csv", [judged.question for judged in verdicts.kept])

@@ -4,15 +4,16 @@ from pathlib import Path
 
 import pytest
 
-from infthor_eval.storage.folders import packaged_folder
 from infthor_eval.training.encoding import Encoder
 from infthor_eval.training.starting_model import load_starting_model
 from model_adapters.hf.loading.loaded import LoadedCheckpoint
 
+from ..helpers.bundled import BUNDLED
+
 
 @pytest.fixture(scope="session")
 def bundled_set() -> Path:
-    return packaged_folder("sets/nieh_mini")
+    return BUNDLED
 
 
 @pytest.fixture(scope="session")

@@ -13,12 +13,12 @@ from typing import Any
 import msgspec
 
 from infthor_eval.errors import DataError, UsageError, in_one_line
+from infthor_eval.formats.packed.paths import REMOTE
 from infthor_eval.formats.reading import read_json
 from infthor_eval.storage.files import write_atomically
 from infthor_eval.storage.folders import user_cache
 
 SCHEME = "hf://"
-REMOTE = "remote.json"
 _ADDRESS = re.compile(r"hf://?([\w.-]+/[\w.-]+?)(?:@([\w./-]+))?/?", re.ASCII)
 _FETCHED_WHOLE = ("*.csv", "*.json", "*.jsonl", "trajectories-*.parquet")
 _HINT = "delete the folder, and fetch the set again"

@@ -10,9 +10,9 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from infthor_eval.errors import DataError, wrap_errors
-from infthor_eval.formats.packed.hub import REMOTE, HubStore
-from infthor_eval.formats.packed.paths import ImageSize, PackedPath
-from infthor_eval.formats.packed.tables import DAMAGED, HINT, READ, LocalStore, Shards, Store
+from infthor_eval.formats.packed.hub import HubStore
+from infthor_eval.formats.packed.paths import READ, REMOTE, ImageSize, PackedPath
+from infthor_eval.formats.packed.tables import DAMAGED, HINT, LocalStore, Shards, Store
 from infthor_eval.storage.digests import digest
 from infthor_eval.storage.files import write_atomically, writing_hint
 

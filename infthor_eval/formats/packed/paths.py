@@ -10,6 +10,8 @@ from pathlib import Path, PurePosixPath
 from typing import Any, Protocol
 
 ImageSize = tuple[int, int]  # width, height
+READ = ("trajectories", "steps", "frames", "files")  # by us; the others are to be looked at
+REMOTE = "remote.json"  # of a set on the hub, in the folder that stands for it
 TABLES = ("questions", "frames", "steps", "trajectories", "twins", "files")
 
 
@@ -130,6 +132,12 @@ def metadata_folder(root: Path) -> SetPath:
     from infthor_eval.formats.packed.pack import ParquetPack  # which others need not load
 
     return ParquetPack(root).metadata
+
+
+def frame_sources(root: Path) -> list[Path]:
+    """Return what holds a set's frames and logs: `metadata/`, or the files of tables."""
+    packed = [path for table in READ for path in sorted(root.glob(f"{table}-*-of-*.parquet"))]
+    return [path for path in (root / "metadata", *packed, root / REMOTE) if path.exists()]
 
 
 def table_configs(root: Path) -> list[dict[str, Any]]:

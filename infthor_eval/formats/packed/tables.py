@@ -89,7 +89,6 @@ SCHEMAS = {
         }
     ),
 }
-READ = ("trajectories", "steps", "frames", "files")  # by us; the others are to be looked at
 _SHARD = re.compile(r"([a-z]+)-(\d{5})-of-(\d{5})\.parquet")
 _LARGEST_GROUP = 2**20  # rows
 _KEPT = 6  # row groups, decoded

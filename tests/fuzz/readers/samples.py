@@ -10,7 +10,8 @@ from infthor_eval.formats.question import Question
 from infthor_eval.formats.step_log import read_steps
 from infthor_eval.formats.trajectory import iter_trajectories
 from infthor_eval.household.sequence_text import sequence_text
-from infthor_eval.storage.folders import packaged_folder
+
+from ...helpers.bundled import BUNDLED
 
 __all__ = ["GOOD", "make_set", "trajectory_document"]
 
@@ -19,7 +20,7 @@ _N_FRAMES = 4
 
 
 def _bundled() -> Path:
-    return packaged_folder("sets/nieh_mini") / "metadata/bedroom-1-seed7"
+    return BUNDLED / "metadata/bedroom-1-seed7"
 
 
 def trajectory_document(traj_id: str, n_actions: int = _N_FRAMES - 1) -> dict[str, Any]:

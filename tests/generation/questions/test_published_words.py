@@ -20,8 +20,9 @@ from infthor_eval.generation.questions.generate import (
 from infthor_eval.generation.questions.history import TrajectoryHistory
 from infthor_eval.generation.questions.published_words import in_published_words
 from infthor_eval.household.wording import noun, object_type
-from infthor_eval.storage.folders import packaged_folder
 from infthor_sim.object_types import OBJECT_TYPES
+
+from ...helpers.bundled import BUNDLED
 
 PUBLISHED = Path(__file__).parents[3] / "../shared/data/published_sets"
 # One published question of each form and its answer, and our form and names. Our answers are
@@ -93,7 +94,7 @@ def test_a_type_is_recovered_from_its_words(name):
 
 
 def histories():
-    for log in sorted((packaged_folder("sets/nieh_mini") / "metadata").glob("*/metadata.json"))[:3]:
+    for log in sorted((BUNDLED / "metadata").glob("*/metadata.json"))[:3]:
         yield TrajectoryHistory(log.parent.name, read_steps(log.parent))
 
 
@@ -117,7 +118,7 @@ def test_further_forms_have_no_published_words():
     with pytest.raises(
         UsageError, match="--further adds forms that have no published words; leave it out"
     ):
-        generate_questions(packaged_folder("sets/nieh_mini"), further=True, published_words=True)
+        generate_questions(BUNDLED, further=True, published_words=True)
 
 
 @pytest.mark.skipif(

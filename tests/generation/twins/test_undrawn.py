@@ -1,10 +1,10 @@
 """Sets of twins without frames, from which the same frames are drawn again."""
 
 import json
-import lzma
 import shutil
 from functools import partial
 
+import pyarrow as pa
 import pytest
 
 from infthor_eval.errors import DataError, UsageError
@@ -99,11 +99,12 @@ def test_what_is_drawn_already_is_not_drawn_again_and_what_differs_is_named(
 
 
 def test_a_world_that_cannot_be_carried_out_is_named(packed, tmp_path):
-    lines = lzma.decompress((packed / WORLDS).read_bytes()).decode().splitlines()
+    lines = pa.input_stream(str(packed / WORLDS)).read().decode().splitlines()
     world = json.loads(lines[0])
     world["plan"]["low_actions"][0]["api_action"] = {"action": "OpenObject", "objectId": "Sofa|1"}
     content = "\n".join([json.dumps(world), *lines[1:]]) + "\n"
-    (packed / WORLDS).write_bytes(lzma.compress(content.encode()))
+    content = pa.Codec("zstd").compress(content.encode(), asbytes=True)
+    (packed / WORLDS).write_bytes(content)
     with pytest.raises(DataError, match=rf"{world['traj_id']}: OpenObject is refused"):
         draw_worlds(packed, tmp_path, WorkerSettings())
 

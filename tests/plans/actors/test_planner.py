@@ -13,12 +13,11 @@ from infthor_eval.plans.plan import PlanKind, plans_of, tasks_of
 from infthor_eval.plans.reward_rules import reward_rules
 from infthor_eval.plans.rewards import PlanReward, max_reward
 from infthor_eval.plans.targets import PlanTarget, target_of
-from infthor_eval.storage.folders import packaged_folder
 from infthor_eval.thor.grounding import Grounding
 from infthor_eval.thor.recorded import translate
 from infthor_eval.thor.restore import restore
 
-SET = packaged_folder("sets/nieh_mini")
+from ...helpers.bundled import BUNDLED
 
 
 def recorded_goal(plan, grid):
@@ -32,7 +31,7 @@ def recorded_goal(plan, grid):
 # thing.
 @pytest.mark.parametrize("name", ["kitchen-1-seed5", "bedroom-2-seed7"])
 def test_every_plan_is_carried_out(simulator, name):
-    trajectory = next(iter_trajectories(SET / "metadata" / name / "traj_data.json"))
+    trajectory = next(iter_trajectories(BUNDLED / "metadata" / name / "traj_data.json"))
     rules = reward_rules("default")
     restored = restore(simulator, trajectory.scene)
     assert not restored.refused and not restored.dropped

@@ -72,7 +72,7 @@ def test_units_are_turned_before_they_are_renamed():
     units = FrameUnits(values.half(), {"d": 0})
     order = list(range(len(UNITS.types)))
     order[at("Mug")], order[at("Laptop")] = at("Laptop"), at("Mug")
-    frame = ChangedFrame("d", (9, 9), (), FrameRef("f", "d"), tuple(order), (at("Laptop"),))
+    frame = ChangedFrame("d", (9, 9), (), FrameRef("f"), tuple(order), (at("Laptop"),))
     changed = units.of(frame)
     assert (changed[:, Role.OPEN, at("Mug")] > 0).tolist() == [True, False]
     assert not (changed[:, Role.OPEN, at("Laptop")] > 0).any()
