@@ -36,6 +36,8 @@ from tiny_families.trial import PEERS, torchvision_path
 
 from infthor_eval.cli.main import collecting_seldom
 from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.packed.paths import SetPath
 from infthor_eval.storage.folders import packaged_folder
 from model_adapters.hf.family import Pixels
 from model_adapters.hf.loading.image_processors import load_image_processor
@@ -200,7 +202,9 @@ def _feed(name: str, way: _Way, n_frames: int, null_rate: int | None) -> tuple[f
         pixels: Pixels = process(images=[piece.ref.load()], return_tensors="pt")
         return pixels
 
-    paths = sorted(packaged_folder("sets/nieh_mini").glob("metadata/*/img/*.png"))[:n_frames]
+    data = NiehSet(packaged_folder("sets/nieh_mini"))
+    names = sorted({question.traj_id for question in data.questions})
+    paths = [frame.path for name in names for frame in data.frames(name)][:n_frames]
     per_chunk = max(way.batch, _CHUNK_TOKENS // _CASES[name].tokens)
     ahead = PixelsAhead(prepare, Ahead(way.n_threads))
     try:
@@ -224,7 +228,7 @@ def _feed(name: str, way: _Way, n_frames: int, null_rate: int | None) -> tuple[f
         ahead.close()
 
 
-def _frames(paths: Sequence[Path]) -> list[Frame]:
+def _frames(paths: Sequence[SetPath]) -> list[Frame]:
     """Return frames as a prompt has them: their digests and sizes are read anew."""
     refs = [FrameRef(path) for path in paths]
     return [Frame(f"{at}{ref.digest}", ref.size, (), ref) for at, ref in enumerate(refs)]

@@ -8,7 +8,6 @@ encodes every prompt as a whole.
 """
 
 import argparse
-import shutil
 import statistics
 import tempfile
 import time
@@ -18,6 +17,7 @@ from pathlib import Path
 from infthor_eval.cli.options.run import RunOptions
 from infthor_eval.cli.options.values import ModelSpec
 from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.packed.paths import frame_sources
 from infthor_eval.formats.qa_csv import write_questions
 from infthor_eval.formats.question import Question
 from infthor_eval.formats.step_log import read_steps
@@ -32,8 +32,9 @@ _MOMENTS, _EACH = 40, 3
 def write_sets(root: Path) -> dict[str, Path]:
     """Write the set with moments and that without, and return their folders by name."""
     bundled = packaged_folder("sets/nieh_mini")
-    traj_id = NiehSet(bundled).questions[0].traj_id
-    steps = read_steps(bundled / "metadata" / traj_id)
+    data = NiehSet(bundled)
+    traj_id = data.questions[0].traj_id
+    steps = read_steps(data.folder(traj_id))
     types = sorted(TrajectoryHistory(traj_id, steps).all_object_types)
     words = [f"Is there any {noun(name)} in this room?" for name in types]
     last = len(steps) - 1
@@ -51,7 +52,9 @@ def write_sets(root: Path) -> dict[str, Path]:
     folders = {}
     for name, asked in (("moments", questions), ("end", at_end)):
         folders[name] = root / name
-        shutil.copytree(bundled / "metadata" / traj_id, root / name / "metadata" / traj_id)
+        folders[name].mkdir()
+        for source in frame_sources(bundled):
+            (folders[name] / source.name).symlink_to(source)
         write_questions(root / name / "qa_set.csv", asked)
     return folders
 

@@ -31,6 +31,7 @@ import msgspec
 from playwright.sync_api import Page, sync_playwright
 
 from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.packed.paths import frame_sources
 from infthor_eval.nieh.records import RECORDS
 from infthor_eval.runs.journals.shards import FOLDER, read_run
 from infthor_eval.storage.folders import packaged_folder
@@ -120,7 +121,8 @@ def make_runs(folder: Path, n_records: int, n_words: int) -> list[Path]:
 def copy_set(small: Path, folder: Path, n_questions: int) -> NiehSet:
     """Write a set with that many questions on the same trajectories."""
     folder.mkdir(parents=True)
-    (folder / "metadata").symlink_to(small / "metadata")
+    for source in frame_sources(small):
+        (folder / source.name).symlink_to(source)
     shutil.copy(small / "set.json", folder)
     (file,) = small.glob("qa_set*.csv")
     with (
