@@ -13,8 +13,8 @@ from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.pictures.blank import blank_like
 from infthor_eval.formats.pictures.video import Video
 from infthor_eval.formats.question import Question
-from infthor_eval.nieh.contexts import Context, ContextPart, QuestionVariant
-from infthor_eval.nieh.options import BLANK, NO_CLUE, OTHER, SHOWN, check_frames
+from infthor_eval.nieh.contexts import VIEW_FOLLOWS, Context, ContextPart, QuestionVariant
+from infthor_eval.nieh.options import BLANK, NO_CLUE, NONE, OTHER, SHOWN, check_frames
 from infthor_eval.nieh.other_homes import count_homes, draw_other_home
 
 
@@ -25,8 +25,8 @@ class FrameAblation:
     Attributes:
         frames: "shown" (the true frames), "blank" (grey frames of the same size), "shuffled" (the
             true frames in another order), "other" (frames at the same positions of another home of
-            the same kind of room) or "no-clue" (without the frames with the evidence, of twins of
-            both worlds).
+            the same kind of room), "no-clue" (without the frames with the evidence, of twins of
+            both worlds) or "none" (texts alone, as models without vision read).
         seed: seed of the order and of the choice of the other home.
     """
 
@@ -54,6 +54,8 @@ class FrameAblation:
             return list(parts)
         # A memory that has not recalled yet shows the last of its frames alone.
         places = sample.frames[-len(frames) :]
+        if self.frames == NONE:
+            return [part.removesuffix(VIEW_FOLLOWS) for part in parts if isinstance(part, str)]
         if self.frames == BLANK:
             replaced: Sequence[FrameRef | None] = [blank_like(frame) for frame in frames]
         elif self.frames == "shuffled":
@@ -80,6 +82,8 @@ class FrameAblation:
 
         Those that stand for others have the positions of these.
         """
+        if self.frames == NONE:
+            return []
         positions = self._positions(data, context, sample)
         hidden = self.hidden(data, sample.question)
         if _keeps_places(sample) or hidden.issuperset(positions):

@@ -19,7 +19,8 @@ SHOWN = "shown"
 BLANK = "blank"
 OTHER = "other"
 NO_CLUE = "no-clue"
-FRAMES = (SHOWN, BLANK, "shuffled", OTHER, NO_CLUE)  # see `infthor_eval.nieh.frame_ablations`
+NONE = "none"
+FRAMES = (SHOWN, BLANK, "shuffled", OTHER, NO_CLUE, NONE)  # see `infthor_eval.nieh.frame_ablations`
 _CONTROLS = f"{SHOWN},{NO_CLUE},{BLANK},{OTHER}"
 _CLIP = "openai/clip-vit-large-patch14"
 _WINDOW = "the context or its window"  # see `infthor_eval.report.causes`
@@ -95,7 +96,8 @@ class NiehSettings:
         str,
         Setting(
             help=f"Frames to show, a run with each: {SHOWN}, {BLANK}, shuffled, {OTHER} (of "
-            f"another home), {NO_CLUE} (without the evidence).",
+            f"another home), {NO_CLUE} (without the evidence), {NONE} (texts alone, which language "
+            "models read).",
             choices=FRAMES,
             in_config=True,
             metavar="HOW,...",

@@ -23,7 +23,7 @@ from infthor_eval.nieh.contexts import (
     context_named,
 )
 from infthor_eval.nieh.frame_ablations import FrameAblation
-from infthor_eval.nieh.options import NO_CLUE, SHOWN
+from infthor_eval.nieh.options import NO_CLUE, NONE, SHOWN
 from infthor_eval.nieh.prompts import PUBLISHED_MAIN
 from infthor_eval.nieh.published.hub_data import default_folder
 from infthor_eval.runs import StoredRequest
@@ -80,8 +80,8 @@ class TaskSamples:
         Those that one question alone hides are not (`hidden`).
         """
         frames = self.data.frames_until(sample.question)
-        # The shown ones are shuffled, once they are recalled.
-        if self.frame_ablation.frames in ("shuffled", NO_CLUE):
+        # The shown ones are shuffled or left out, once they are recalled.
+        if self.frame_ablation.frames in ("shuffled", NO_CLUE, NONE):
             return list(frames)
         ablated = self.frame_ablation.apply(frames, self.data, self.context, sample)
         return [part for part in ablated if isinstance(part, FrameRef)]
@@ -100,7 +100,8 @@ class TaskSamples:
 
     def request(self, sample: QuestionVariant) -> tuple[list[ContextPart], str]:
         """Return the request of a sample: the context, and the text with the question after it."""
-        parts, text = self.context.request(self.data, sample, self.prompt)
+        has_frames = self.frame_ablation.frames != NONE
+        parts, text = self.context.request(self.data, sample, self.prompt, has_frames=has_frames)
         return self.frame_ablation.apply(parts, self.data, self.context, sample), text
 
     def stored_request(

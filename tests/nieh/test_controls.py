@@ -1,6 +1,7 @@
 """Frame ablations of twins and of memories: both worlds see the same, and records say what."""
 
 import json
+import shutil
 from dataclasses import replace
 
 import pytest
@@ -9,6 +10,7 @@ from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.outline import read_outline
 from infthor_eval.formats.pictures.video import Video
+from infthor_eval.formats.qa_csv import read_questions, write_questions
 from infthor_eval.formats.question import Question
 from infthor_eval.nieh.asking.recalling import recall_all
 from infthor_eval.nieh.contexts import QuestionVariant
@@ -18,6 +20,7 @@ from infthor_eval.nieh.twins import twin_side
 from infthor_eval.nieh.units import shown_clues
 from infthor_eval.runs import read_header
 
+from ..helpers.bundled import BUNDLED
 from ..helpers.command_line import assert_refused, option_words, read_success
 from ..helpers.twin_homes import CLUES, N_FRAMES, write_twin_homes
 
@@ -52,6 +55,61 @@ def by_world(task_samples, samples=None):
 
 def own_pictures(root, name):
     return [frame.path.name for frame in open_set(str(root)).frames(name)]
+
+
+# -- none
+
+
+@pytest.mark.parametrize(
+    ("context", "intro"),
+    [
+        ("interleaved_plans", "given the state and action sequence"),
+        ("interleaved", "given the state and action sequence"),
+        ("text_state", "given the description of the environment and the agent's state."),
+        ("trajectory", "Answer the question. "),
+        ("clues", "Answer the question. "),
+    ],
+)
+@pytest.mark.parametrize("moment", [None, 40])
+def test_texts_alone_speak_of_no_frame(context, intro, moment, tmp_path):
+    root = shutil.copytree(BUNDLED, tmp_path / "set")
+    (file,) = root.glob("qa_set*.csv")
+    asked = [replace(it, moment=moment) for it in read_questions(file) if max(it.clues) <= 40]
+    write_questions(file, asked)
+    task_samples = find(root, "none", context)
+    shown = find(root, "shown", context)
+    assert len(task_samples.samples) == len(shown.samples) > 10
+    for sample in task_samples.samples[::7]:
+        parts, text = task_samples.request(sample)
+        with_frames, _ = shown.request(sample)
+        texts = [part for part in with_frames if isinstance(part, str)]
+        assert [part.removesuffix("; Last agent's view: ") for part in texts] == parts
+        assert intro in text
+        assert "image" not in text and not any("view" in part for part in parts)
+        assert task_samples.positions(sample) == task_samples.true_positions(sample) == []
+    # What is said until a moment is the beginning of what is said in the end.
+    if context == "interleaved_plans" and moment is not None:
+        sample = task_samples.samples[0]
+        whole = "".join(find(BUNDLED, "none", context).request(replace_moment(sample))[0])
+        assert whole.startswith("".join(task_samples.request(sample)[0]))
+
+
+def replace_moment(sample):
+    """The sample of the same question at the end of its trajectory."""
+    name = sample.question.traj_id
+    samples = find(BUNDLED, "none", "interleaved_plans").samples
+    return next(it for it in samples if it.question.traj_id == name)
+
+
+def test_texts_that_are_recalled_come_without_the_view(run_cli, tmp_path):
+    words = option_words(
+        model="oracle", tasks="nieh_memory", data=BUNDLED, memory="text-log", out=tmp_path / "out"
+    )
+    read_success(run_cli(*words, "--frames", "none"))
+    (file,) = (tmp_path / "out").rglob("samples_*.jsonl")
+    sample = json.loads(file.read_text().splitlines()[0])
+    assert "views, in time order." in json.dumps(sample)
+    assert "last image" not in json.dumps(sample)
 
 
 # -- no-clue

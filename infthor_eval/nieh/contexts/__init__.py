@@ -7,6 +7,7 @@ file in `tasks/nieh/contexts/`.
 from infthor_eval.errors import UsageError
 from infthor_eval.nieh.contexts import interleaved, memory, video, views
 from infthor_eval.nieh.contexts.base import (
+    VIEW_FOLLOWS,
     Context,
     ContextPart,
     ContextSettings,
@@ -21,6 +22,7 @@ __all__ = [
     "DEFAULT_CONTEXT",
     "MEMORY",
     "RETRIEVED",
+    "VIEW_FOLLOWS",
     "Context",
     "ContextPart",
     "ContextSettings",
@@ -42,16 +44,22 @@ CONTEXTS = {
     "interleaved": Context(
         interleaved.interleaved,
         intro=_INTERLEAVED,
+        intro_without_frames=_INTERLEAVED,
         parts=interleaved.interleaved_parts,
         sources=trajectories_identity,
     ),
     "interleaved_plans": Context(
-        interleaved.interleaved_plans, intro=_INTERLEAVED, parts=interleaved.plans_parts
+        interleaved.interleaved_plans,
+        intro=_INTERLEAVED,
+        intro_without_frames=_INTERLEAVED,
+        parts=interleaved.plans_parts,
     ),
     "text_state": Context(
         views.text_state,
         intro="Answer the question given the description of the environment and the agent's state "
         "(the last image).",
+        intro_without_frames="Answer the question given the description of the environment and "
+        "the agent's state.",
         parts=views.state_parts,
         sources=trajectories_identity,
     ),
@@ -64,7 +72,13 @@ CONTEXTS = {
         positions=video.video_positions,
         sources=video.video_identity,
     ),
-    MEMORY: Context(memory.memory, parts=memory.recalled_parts, sources=memory.memory_sources),
+    MEMORY: Context(
+        memory.memory,
+        intro_without_frames="Answer the question given what was recalled of the agent's views, "
+        "in time order.",
+        parts=memory.recalled_parts,
+        sources=memory.memory_sources,
+    ),
 }
 
 

@@ -19,6 +19,7 @@ from infthor_eval.settings import Setting
 from infthor_eval.storage.digests import digest, fingerprint
 
 ContextPart = str | FrameRef | Video
+VIEW_FOLLOWS = "; Last agent's view: "  # text before a frame, which goes with it
 _Fps = Annotated[float, Meta(gt=0, le=FILM_FPS)]
 
 
@@ -162,6 +163,7 @@ class Context:
         intro: the sentence that says what the model sees; the published one where the context is
             published.
         text_intro: the sentence where texts were recalled.
+        intro_without_frames: the sentence where no frame is shown.
         prompts: the prompts in which it can be asked.
         parts: returns what the model sees before that sentence, given the frames of a sample.
         frames: returns the frames of a trajectory that the positions of a sample refer to, given
@@ -178,6 +180,7 @@ class Context:
         "Answer the question given what was recalled of the agent's views, in time order, and its "
         "last view (the last image)."
     )
+    intro_without_frames: str = "Answer the question."
     prompts: tuple[str, ...] = (PUBLISHED_MAIN,)
     parts: Callable[[NiehSet, QuestionVariant, Sequence[FrameRef]], list[ContextPart]] = field(
         default=_only_frames
@@ -194,13 +197,20 @@ class Context:
         return [frames[position] for position in sample.frames]
 
     def request(
-        self, data: NiehSet, sample: QuestionVariant, prompt: str = PUBLISHED_MAIN
+        self,
+        data: NiehSet,
+        sample: QuestionVariant,
+        prompt: str = PUBLISHED_MAIN,
+        *,
+        has_frames: bool = True,
     ) -> tuple[list[ContextPart], str]:
-        """Return the request of a sample: the context, and the text with the question after it."""
+        """Return the request of a sample: the context, and the text with the question after it,
+        which speaks of frames if they are shown."""
         parts = self.parts(data, sample, self.select_frames(data, sample))
         has_texts = any(isinstance(part, str) for part in sample.recalled or ())
+        intro = self.text_intro if has_texts else self.intro
         return parts, question_text(
-            self.text_intro if has_texts else self.intro, sample.question, prompt
+            intro if has_frames else self.intro_without_frames, sample.question, prompt
         )
 
 

@@ -8,7 +8,12 @@ from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question, SkippedQuestion
-from infthor_eval.nieh.contexts.base import ContextPart, ContextSettings, QuestionVariant
+from infthor_eval.nieh.contexts.base import (
+    VIEW_FOLLOWS,
+    ContextPart,
+    ContextSettings,
+    QuestionVariant,
+)
 
 if TYPE_CHECKING:
     from model_adapters.hf.retrieval import Retriever
@@ -67,7 +72,7 @@ def state_parts(
     last = _last_action(data, sample.question)
     assert last is not None  # or there were no sample
     state = data.states(sample.question.traj_id)[last]
-    return [f" State: {state}; Last agent's view: ", *frames]
+    return [f" State: {state}{VIEW_FOLLOWS}", *frames]
 
 
 def _last_action(data: NiehSet, question: Question) -> int | None:
