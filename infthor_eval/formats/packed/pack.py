@@ -3,7 +3,7 @@
 Every file that is read has the digest that the tables have of it, or is refused.
 """
 
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path, PurePosixPath
@@ -45,6 +45,19 @@ class _Entry:
     size: ImageSize | None = None
 
 
+@dataclass(frozen=True)
+class _Steps:
+    """What a row group of steps has: frames by trajectory and file, and each one's rows."""
+
+    frames: Mapping[str, Mapping[str, _Entry]]
+    rows: Mapping[str, range]
+
+
+def _size(size: Sequence[int | None]) -> ImageSize | None:
+    width, height = size
+    return None if width is None or height is None else (width, height)
+
+
 def split_log(content: bytes) -> list[bytes] | None:
     """Return the entries of a step log, or None if `join_log` would not give its bytes again."""
     lines = content[len(_LOG_START) : -len(_LOG_END)].split(_LOG_BREAK)
@@ -72,6 +85,7 @@ class ParquetPack:
             for shards in self._tables.values():
                 shards.check()
         self._files: dict[str, Mapping[str, _Entry]] = {}
+        self._steps: dict[tuple[int, int], _Steps] = {}  # by shard and row group
         self._shared: dict[str, _Entry] = {}
 
     def __reduce__(self) -> tuple[Callable[..., Any], tuple[Path]]:
@@ -148,11 +162,12 @@ class ParquetPack:
         table = self._tables[entry.table]
         where = f"{self.root / file}: cannot be read"
         if entry.table == "steps":
-            rows = table.read(entry.shard, entry.row_group, ("traj_id", "log"))
+            rows = table.read(entry.shard, entry.row_group, ("log",))
             with wrap_errors(where, HINT, catch=DAMAGED):
-                named = zip(rows["traj_id"].to_pylist(), rows["log"].to_pylist(), strict=True)
-                traj_id = PurePosixPath(file).parts[1]
-                content = join_log([log.encode() for name, log in named if name == traj_id])
+                group = self._read_steps(entry.shard, entry.row_group)
+                own = group.rows[PurePosixPath(file).parts[1]]
+                logs = rows["log"].slice(own.start, len(own)).to_pylist()
+                content = join_log([log.encode() for log in logs])
         else:
             column = "image" if entry.table == "frames" else "content"
             rows = table.read(entry.shard, entry.row_group, (column,))
@@ -190,12 +205,19 @@ class ParquetPack:
     def _read_trajectory(self, traj_id: str) -> Mapping[str, _Entry]:
         """Return the files of a trajectory's folder by their path in it."""
         if traj_id not in self._files:
+            row = self._trajectories[traj_id]
             with wrap_errors(f"{self.root}: trajectory {traj_id}", HINT, catch=DAMAGED):
-                self._files[traj_id] = self._index(traj_id)
+                files = self._index_files(row)
+                group = self._read_steps(row["shard"], row["row_group"])
+                for name, frame in group.frames.get(traj_id, {}).items():
+                    if name.startswith(f"{SHARED}/"):
+                        self._shared[name.removeprefix(f"{SHARED}/")] = frame
+                    else:
+                        files[self._check_name(name)] = frame
+            self._files[traj_id] = files
         return self._files[traj_id]
 
-    def _index(self, traj_id: str) -> dict[str, _Entry]:
-        row = self._trajectories[traj_id]
+    def _index_files(self, row: Mapping[str, Any]) -> dict[str, _Entry]:
         files = {}
         for file in row["files"]:
             in_steps = file["shard"] is None
@@ -208,19 +230,24 @@ class ParquetPack:
                 place["row_group"],
                 file["row"] or 0,
             )
-        steps = self._tables["steps"].read(row["shard"], row["row_group"], _STEP_COLUMNS)
-        for step in steps.to_pylist():
-            if step["traj_id"] != traj_id or step["frame"] is None:
-                continue
-            size = None if step["width"] is None else (step["width"], step["height"])
-            place = (step["shard"], step["row_group"], step["row"])
-            frame = _Entry("frames", step["n_bytes"], step["frame"], *place, size)
-            name = self._check_name(step["file"])
-            if name.startswith(f"{SHARED}/"):
-                self._shared[name.removeprefix(f"{SHARED}/")] = frame
-            else:
-                files[name] = frame
         return files
+
+    def _read_steps(self, shard: int, row_group: int) -> _Steps:
+        """Return what a row group of steps has of each trajectory in it."""
+        if (shard, row_group) not in self._steps:
+            steps = self._tables["steps"].read(shard, row_group, _STEP_COLUMNS)
+            frames: dict[str, dict[str, _Entry]] = {}
+            rows: dict[str, range] = {}  # those of a trajectory are neighbours
+            columns = [steps[name].to_pylist() for name in _STEP_COLUMNS]
+            for at, (name, file, frame, n_bytes, *size, group, at_group, at_row) in enumerate(
+                zip(*columns, strict=True)
+            ):
+                rows[name] = range(rows[name].start if name in rows else at, at + 1)
+                if frame is not None:
+                    entry = _Entry("frames", n_bytes, frame, group, at_group, at_row, _size(size))
+                    frames.setdefault(name, {})[file] = entry
+            self._steps[shard, row_group] = _Steps(frames, rows)
+        return self._steps[shard, row_group]
 
     def _check_name(self, name: object, most: int = 8) -> str:
         """Return a path within the set that cannot lead out of it."""

@@ -272,7 +272,7 @@ class _Group:
             return []
         self._write_frames()
         logs = {name: self._read_log(name) for name in self._frames}
-        files = {name: self._write_files(name, logs[name].content) for name in self._frames}
+        files = self._write_files(logs)
         steps = [self._steps(name, logs[name]) for name in self._frames]
         place = self._tables.write("steps", list(chain.from_iterable(steps)))
         return [self._trajectory(name, files[name]) | place for name in self._frames]
@@ -305,30 +305,31 @@ class _Group:
             return _Log(steps, [line.decode() for line in lines], content)
         return _Log(steps, [msgspec.json.encode(step).decode() for step in steps])
 
-    def _write_files(self, name: str, log: bytes | None) -> list[dict[str, Any]]:
-        """Write all that is in a trajectory's folder but frames, and a log that is in the steps."""
-        folder = self._data.folder(name)
+    def _write_files(self, logs: Mapping[str, _Log]) -> dict[str, list[dict[str, Any]]]:
+        """Write all that is in trajectories' folders but frames, and logs that are in the steps;
+        return what each trajectory's row says of them."""
         frames = {str(frame.path) for frame in self._pictures}
-        named: list[dict[str, Any]] = []
-        contents: dict[str, bytes] = {}
-        for path in _walk(folder):
-            if str(path) in frames or (log is not None and path == folder / LOG):
-                continue
-            contents[str(path).removeprefix(f"{folder}/")] = path.read_bytes()
-        if log is not None:
-            named.append({"name": LOG, "n_bytes": len(log), "digest": digest(log)})
-        large = [[it] for it in contents if len(contents[it]) > _LARGE_FILE]
-        small = [it for it in contents if len(contents[it]) <= _LARGE_FILE]
-        for part in filter(None, [small, *large]):
-            rows = [{"traj_id": name, "name": it, "content": contents[it]} for it in part]
-            place = self._tables.write("files", rows)
-            named += [
-                {"name": it, "n_bytes": len(contents[it]), "digest": digest(contents[it])}
-                | place
-                | {"row": row}
-                for row, it in enumerate(part)
-            ]
-        return named
+        listed: dict[str, list[dict[str, Any]]] = {}
+        parts: list[list[dict[str, Any]]] = [[]]  # all small ones are a row group
+        for name, log in logs.items():
+            folder = self._data.folder(name)
+            listed[name] = [] if log.content is None else [_listed(LOG, log.content)]
+            for path in _walk(folder):
+                if str(path) in frames or (log.content is not None and path == folder / LOG):
+                    continue
+                inside = str(path).removeprefix(f"{folder}/")
+                content = path.read_bytes()
+                row = {"traj_id": name, "name": inside, "content": content}
+                if len(content) > _LARGE_FILE:
+                    parts.append([row])
+                else:
+                    parts[0].append(row)
+        for part in filter(None, parts):
+            place = self._tables.write("files", part)
+            for at, entry in enumerate(part):
+                named = _listed(entry["name"], entry["content"])
+                listed[entry["traj_id"]].append({**named, **place, "row": at})
+        return listed
 
     def _steps(self, name: str, log: _Log) -> Iterator[dict[str, Any]]:
         folder = f"{self._data.folder(name)}/"
@@ -359,6 +360,10 @@ class _Group:
             "n_frames": len(self._frames[name]),
             "files": files,
         }
+
+
+def _listed(name: str, content: bytes) -> dict[str, Any]:
+    return {"name": name, "n_bytes": len(content), "digest": digest(content)}
 
 
 def _sorted(folder: SetPath) -> list[SetPath]:

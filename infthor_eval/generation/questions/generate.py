@@ -143,7 +143,7 @@ def generate_questions(
     return result
 
 
-def _moments(path: Path, share: float, n: int) -> list[int]:
+def _moments(path: SetPath, share: float, n: int) -> list[int]:
     """Return the last frames of so many equal parts of a trajectory."""
     n_frames = len(_read_history(path, share))
     return sorted({max(0, n_frames * part // n - 1) for part in range(1, n + 1)})
@@ -189,7 +189,7 @@ def _object_types(
 class Asked(NamedTuple):
     """A trajectory's folder, and the frame after which it is asked about; None for the end."""
 
-    path: Path
+    path: SetPath
     moment: int | None = None
 
     def history(self, share: float) -> TrajectoryHistory:
