@@ -51,7 +51,7 @@ def set_folder(place: str | Path) -> Path:
     try:
         info = HfApi().dataset_info(repository, revision=revision, files_metadata=True)
         name = f"{repository.replace('/', '--')}-{str(info.sha)[:12]}"
-        folder = user_cache("hub_sets") / name
+        folder = _folders() / name
         if not (folder / REMOTE).is_file():
             snapshot_download(
                 repository,
@@ -71,6 +71,16 @@ def set_folder(place: str | Path) -> Path:
             "with `hf auth login`, or give a folder"
         ) from error
     return folder
+
+
+def is_remote(root: Path) -> bool:
+    """Return True for a folder that stands for a set on the hub: one that was made here."""
+    remote = root / REMOTE
+    return remote.is_file() and remote.resolve().parent.parent == _folders().resolve()
+
+
+def _folders() -> Path:
+    return user_cache("hub_sets")
 
 
 @dataclass(frozen=True)

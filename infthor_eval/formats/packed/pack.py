@@ -10,8 +10,8 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from infthor_eval.errors import DataError, wrap_errors
-from infthor_eval.formats.packed.hub import HubStore
-from infthor_eval.formats.packed.paths import READ, REMOTE, ImageSize, PackedPath
+from infthor_eval.formats.packed.hub import HubStore, is_remote
+from infthor_eval.formats.packed.paths import READ, ImageSize, PackedPath
 from infthor_eval.formats.packed.tables import DAMAGED, HINT, LocalStore, Shards, Store
 from infthor_eval.storage.digests import digest
 from infthor_eval.storage.files import write_atomically, writing_hint
@@ -19,6 +19,7 @@ from infthor_eval.storage.files import write_atomically, writing_hint
 METADATA = "metadata"
 SHARED = "frames"
 _LOG_START, _LOG_BREAK, _LOG_END = b"[\n", b",\n", b"\n]\n"  # of our step logs, an entry a line
+_DEEPEST = 100  # folders in one another
 _STEP_COLUMNS = (
     "traj_id",
     "file",
@@ -43,6 +44,12 @@ class _Entry:
     row_group: int
     row: int = 0
     size: ImageSize | None = None
+
+    def __post_init__(self) -> None:
+        """Raise ValueError if this is no place of a file."""
+        numbers = (self.n_bytes, self.shard, self.row_group, self.row)
+        if not all(isinstance(number, int) and number >= 0 for number in numbers):
+            raise ValueError(f"no place of a file: {numbers}")
 
 
 @dataclass(frozen=True)
@@ -79,7 +86,7 @@ class ParquetPack:
 
     def __init__(self, root: Path, *, check: bool = True) -> None:
         self.root = root
-        self._store: Store = HubStore(root) if (root / REMOTE).is_file() else LocalStore(root)
+        self._store: Store = HubStore(root) if is_remote(root) else LocalStore(root)
         self._tables = {table: Shards(table, self._store) for table in READ}
         if check:
             for shards in self._tables.values():
@@ -87,6 +94,7 @@ class ParquetPack:
         self._files: dict[str, Mapping[str, _Entry]] = {}
         self._steps: dict[tuple[int, int], _Steps] = {}  # by shard and row group
         self._shared: dict[str, _Entry] = {}
+        self._shared_by: dict[str, Mapping[str, _Entry]] = {}  # by trajectory
 
     def __reduce__(self) -> tuple[Callable[..., Any], tuple[Path]]:
         """Frames of one set that are sent to another process have one pack there too."""
@@ -121,11 +129,10 @@ class ParquetPack:
         entry = self._find(file)
         return entry.size if entry else None
 
-    def shared_files(self) -> Iterator[PackedPath]:
-        """Yield the pictures that are in no trajectory's folder."""
-        for traj_id in self._trajectories:
-            self._read_trajectory(traj_id)
-        for name in self._shared:
+    def shared_files(self, traj_id: str) -> Iterator[PackedPath]:
+        """Yield a trajectory's pictures that are not in its folder."""
+        self._read_trajectory(traj_id)
+        for name in self._shared_by[traj_id]:
             yield PackedPath(f"{SHARED}/{name}", self)
 
     def read(self, file: str) -> bytes:
@@ -174,7 +181,8 @@ class ParquetPack:
             with wrap_errors(where, HINT, catch=DAMAGED):
                 value = rows[column][entry.row].as_py()
                 content = value["bytes"] if entry.table == "frames" else value
-        if not isinstance(content, bytes) or digest(content) != entry.digest:
+        is_bytes = isinstance(content, bytes) and len(content) == entry.n_bytes
+        if not is_bytes or digest(content) != entry.digest:
             raise DataError(
                 f"{self.root / file}: is not the content that its digest was taken of; {HINT}"
             )
@@ -187,7 +195,8 @@ class ParquetPack:
         if parts[0] != SHARED or len(parts) != 2:
             return None
         if parts[1] not in self._shared:  # of a trajectory that was not opened in this process
-            list(self.shared_files())
+            for traj_id in self._trajectories:
+                self._read_trajectory(traj_id)
         return self._shared.get(parts[1])
 
     @cached_property
@@ -206,15 +215,18 @@ class ParquetPack:
         """Return the files of a trajectory's folder by their path in it."""
         if traj_id not in self._files:
             row = self._trajectories[traj_id]
+            shared: dict[str, _Entry] = {}
             with wrap_errors(f"{self.root}: trajectory {traj_id}", HINT, catch=DAMAGED):
                 files = self._index_files(row)
                 group = self._read_steps(row["shard"], row["row_group"])
                 for name, frame in group.frames.get(traj_id, {}).items():
-                    if name.startswith(f"{SHARED}/"):
-                        self._shared[name.removeprefix(f"{SHARED}/")] = frame
+                    if self._check_name(name).startswith(f"{SHARED}/"):
+                        shared[name.removeprefix(f"{SHARED}/")] = frame
                     else:
-                        files[self._check_name(name)] = frame
+                        files[name] = frame
             self._files[traj_id] = files
+            self._shared_by[traj_id] = shared
+            self._shared |= shared
         return self._files[traj_id]
 
     def _index_files(self, row: Mapping[str, Any]) -> dict[str, _Entry]:
@@ -249,7 +261,7 @@ class ParquetPack:
             self._steps[shard, row_group] = _Steps(frames, rows)
         return self._steps[shard, row_group]
 
-    def _check_name(self, name: object, most: int = 8) -> str:
+    def _check_name(self, name: object, most: int = _DEEPEST) -> str:
         """Return a path within the set that cannot lead out of it."""
         parts = name.split("/") if isinstance(name, str) else [""]
         if len(parts) > most or any(part in {"", ".", ".."} or "\0" in part for part in parts):

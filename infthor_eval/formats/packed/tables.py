@@ -97,6 +97,7 @@ HINT = "pack the set again, or save what is whole: infthor-eval unpack --skip-da
 # What pyarrow raises on damaged and forged files. RuntimeError: thrift's.
 DAMAGED = (
     pa.ArrowException,
+    AttributeError,
     OSError,
     ValueError,
     LookupError,

@@ -6,7 +6,7 @@ take a few bytes each where they are nearly equal.
 """
 
 import shutil
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import chain, islice, zip_longest
 from pathlib import Path
@@ -19,11 +19,12 @@ import yaml
 
 from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import FrameRef
-from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.nieh_set import IMAGE_FOLDERS, NiehSet
 from infthor_eval.formats.packed.pack import METADATA, SHARED, ParquetPack, split_log
-from infthor_eval.formats.packed.paths import ImageSize, SetPath, table_configs
+from infthor_eval.formats.packed.paths import REMOTE, ImageSize, SetPath, is_packed, table_configs
 from infthor_eval.formats.packed.tables import SCHEMAS, shard_name
 from infthor_eval.formats.question import Question
+from infthor_eval.formats.reading import file_problem
 from infthor_eval.formats.step_log import LOG, Step, read_steps
 from infthor_eval.formats.twins import TwinPair
 from infthor_eval.storage.digests import digest
@@ -36,6 +37,8 @@ _SHARD_BYTES = 500_000_000
 _FRAMES = 32  # in a row group: what is fetched for one of them
 _QUESTIONS = 256  # in a row group
 _LARGE_FILE = 2**22  # bytes; it is a row group by itself
+_LARGEST = 2**63  # a number that no column can hold
+_LARGEST_FILE = 2**31 - 2  # bytes that a column cannot hold
 _ONE_PAGE = 2**30  # bytes; a page is what is compressed together
 
 
@@ -59,10 +62,12 @@ class Packed:
     Attributes:
         n_trajectories: trajectories that are in the new one.
         damaged: why others are not.
+        left_out: why other files are not, by path.
     """
 
     n_trajectories: int = 0
     damaged: list[str] = field(default_factory=list)
+    left_out: dict[str, str] = field(default_factory=dict)
 
 
 def pack_set(
@@ -86,7 +91,7 @@ def pack_set(
     tables = _Tables(out, settings)
     trajectories: list[dict[str, Any]] = []
     for names in _groups(data).values():
-        trajectories += _Group(data, tables).write(names, packed.damaged)
+        trajectories += _Group(data, tables, packed).write(names)
         for _ in names:
             advance()
     if trajectories:
@@ -94,14 +99,14 @@ def pack_set(
         packed.n_trajectories = len(trajectories)
     for at in range(0, len(data.questions), _QUESTIONS):
         part = data.questions[at : at + _QUESTIONS]
-        tables.write("questions", [_question_row(data, question) for question in part])
+        tables.write("questions", [_question_row(data, it, packed.left_out) for it in part])
     pairs = {pair.id: pair for pair in data.twins.values()}
     if pairs:
         tables.write("twins", [_pair_row(pair) for pair in pairs.values()])
     tables.close()
-    for file in data.directory.iterdir():
-        if not file.name.startswith("."):
-            _copy_file(file, out)
+    for file in sorted(data.directory.iterdir()):
+        if file.name not in (METADATA, SHARED) and not _copy_file(file, out):
+            packed.left_out[str(file)] = "is no file of a set's own"
     front = yaml.safe_dump({"configs": table_configs(out)}, sort_keys=False)
     (out / CARD[0]).write_text(f"---\n{front}---\n{_README}", encoding="utf-8")
     return packed
@@ -124,22 +129,28 @@ def unpack_set(root: Path, out: Path, *, skip_damaged: bool) -> Packed:
     for folder in pack.metadata.iterdir():
         try:
             _copy_files(folder, out / METADATA / folder.name)
+            for picture in pack.shared_files(folder.name):
+                if not (out / SHARED / picture.name).exists():
+                    _write(picture, out / SHARED / picture.name)
             unpacked.n_trajectories += 1
         except DataError as error:
             if not skip_damaged:
                 raise
             shutil.rmtree(out / METADATA / folder.name, ignore_errors=True)
             unpacked.damaged.append(str(error))
-    for picture in pack.shared_files():
-        _write(picture, out / SHARED / picture.name)
     for file in root.iterdir():
         _copy_file(file, out)
     return unpacked
 
 
-def _copy_file(file: Path, out: Path) -> None:
-    if file.is_file() and file.suffix != ".parquet" and file.name not in CARD:
-        shutil.copyfile(file, out / file.name)
+def _copy_file(file: Path, out: Path) -> bool:
+    """Copy a file of the set's own; return False for what is none. A card is made anew."""
+    if file.name in CARD or (file.suffix == ".parquet" and is_packed(file.parent)):
+        return True
+    if file.name == REMOTE or file.name.startswith(".") or file.is_symlink() or not file.is_file():
+        return False
+    shutil.copyfile(file, out / file.name)
+    return True
 
 
 def _copy_files(folder: SetPath, out: Path) -> None:
@@ -254,20 +265,22 @@ class _Log:
 class _Group:
     """Trajectories that are compressed together."""
 
-    def __init__(self, data: NiehSet, tables: _Tables) -> None:
+    def __init__(self, data: NiehSet, tables: _Tables, packed: Packed) -> None:
         self._data = data
+        self._packed = packed
         self._tables = tables
         self._frames: dict[str, dict[int, FrameRef]] = {}
         self._pictures: dict[FrameRef, _Picture] = {}
 
-    def write(self, names: Sequence[str], damaged: list[str]) -> list[dict[str, Any]]:
+    def write(self, names: Sequence[str]) -> list[dict[str, Any]]:
         """Write what can be read of trajectories, and return their own rows."""
         for name in names:
             try:
                 numbers = self._data.frame_numbers(name)
+                self._check(name, numbers)
                 self._frames[name] = dict(zip(numbers, self._data.frames(name), strict=True))
             except DataError as error:
-                damaged.append(str(error))
+                self._packed.damaged.append(str(error))
         if not self._frames:
             return []
         self._write_frames()
@@ -277,22 +290,49 @@ class _Group:
         place = self._tables.write("steps", list(chain.from_iterable(steps)))
         return [self._trajectory(name, files[name]) | place for name in self._frames]
 
+    def _check(self, name: str, numbers: Sequence[int]) -> None:
+        """Refuse a trajectory that Parquet cannot hold."""
+        if not numbers or max(map(abs, numbers)) >= _LARGEST or not _is_text(name):
+            folder = self._data.folder(name)
+            raise DataError(f"{folder}: has no frame, or a number or name that no table can hold")
+
     def _write_frames(self) -> None:
         """Write each distinct picture once; those of one step are neighbours."""
         by_step = chain.from_iterable(zip_longest(*(it.values() for it in self._frames.values())))
         frames = iter(dict.fromkeys(frame for frame in by_step if frame is not None))
         places: dict[str, Mapping[str, int]] = {}
         while part := list(islice(frames, self._tables.settings.frames_per_group)):
-            read = {frame: frame.path.read_bytes() for frame in part if frame.n_bytes is not None}
+            read = {
+                frame: frame.path.read_bytes() for frame in part if self._may_be_read(frame.path)
+            }
             digests = {frame: digest(content) for frame, content in read.items()}
             new = {name: frame for frame, name in digests.items() if name not in places}
-            rows = [{"digest": name, "image": _image(frame)} for name, frame in new.items()]
+            rows = [
+                {"digest": name, "image": {"bytes": read[frame], "path": frame.name}}
+                for name, frame in new.items()
+            ]
             if rows:
                 place = self._tables.write("frames", rows)
                 places |= {name: {**place, "row": row} for row, name in enumerate(new)}
             for frame, name in digests.items():
                 size = _size_of(frame)
                 self._pictures[frame] = _Picture(name, len(read[frame]), size, places[name])
+
+    def _may_be_read(self, path: SetPath) -> bool:
+        """Return False for what is no file of the set; links that lead out of it are none."""
+        roots = (self._data.folder(""), self._data.directory)
+        problem = file_problem(path)
+        if problem is None and not _is_text(path.name):
+            problem = "has a name that is no text"
+        if problem is None and path.stat().st_size >= _LARGEST_FILE:
+            problem = "is too large for a table"
+        if problem is None and isinstance(path, Path):
+            inside = [root.resolve() for root in roots if isinstance(root, Path)]
+            if not any(path.resolve().is_relative_to(root) for root in inside):
+                problem = "is a link that leads out of the set"
+        if problem is not None:
+            self._packed.left_out[str(path)] = problem
+        return problem is None
 
     def _read_log(self, name: str) -> _Log:
         folder = self._data.folder(name)
@@ -314,8 +354,10 @@ class _Group:
         for name, log in logs.items():
             folder = self._data.folder(name)
             listed[name] = [] if log.content is None else [_listed(LOG, log.content)]
-            for path in _walk(folder):
+            for path in self._walk(folder):
                 if str(path) in frames or (log.content is not None and path == folder / LOG):
+                    continue
+                if not self._may_be_read(path):
                     continue
                 inside = str(path).removeprefix(f"{folder}/")
                 content = path.read_bytes()
@@ -330,6 +372,17 @@ class _Group:
                 named = _listed(entry["name"], entry["content"])
                 listed[entry["traj_id"]].append({**named, **place, "row": at})
         return listed
+
+    def _walk(self, folder: SetPath) -> Iterator[SetPath]:
+        """Yield all files below a folder, in order of their names."""
+        for path in _sorted(folder):
+            if isinstance(path, Path) and path.is_symlink() and path.is_dir():
+                if path.name not in IMAGE_FOLDERS:
+                    self._packed.left_out[str(path)] = "is a link to a folder"
+            elif path.is_dir():
+                yield from self._walk(path)
+            else:
+                yield path
 
     def _steps(self, name: str, log: _Log) -> Iterator[dict[str, Any]]:
         folder = f"{self._data.folder(name)}/"
@@ -371,15 +424,6 @@ def _sorted(folder: SetPath) -> list[SetPath]:
     return sorted(paths, key=lambda path: path.name)
 
 
-def _walk(folder: SetPath) -> Iterator[SetPath]:
-    """Yield all files below a folder, in order of their names."""
-    for path in _sorted(folder):
-        if path.is_dir():
-            yield from _walk(path)
-        elif path.is_file():
-            yield path
-
-
 def _size_of(frame: FrameRef) -> ImageSize | None:
     try:
         return frame.size
@@ -387,11 +431,12 @@ def _size_of(frame: FrameRef) -> ImageSize | None:
         return None
 
 
-def _image(frame: FrameRef) -> dict[str, Any]:
-    return {"bytes": frame.path.read_bytes(), "path": frame.name}
+def _is_text(name: str) -> bool:
+    """Return False for a name that is not UTF-8 on the disk."""
+    return not any("\ud800" <= letter <= "\udfff" for letter in name)
 
 
-def _question_row(data: NiehSet, question: Question) -> dict[str, Any]:
+def _question_row(data: NiehSet, question: Question, left_out: Collection[str]) -> dict[str, Any]:
     frames = data.clue_frames(question) if data.has_frames else ()
     return {
         "id": question.id,
@@ -405,7 +450,11 @@ def _question_row(data: NiehSet, question: Question) -> dict[str, Any]:
         "pair": question.pair or None,
         "fact": question.fact or None,
         "file": question.file or None,
-        "clue_frames": [_image(frame) for frame in frames],
+        "clue_frames": [
+            {"bytes": frame.path.read_bytes(), "path": frame.name}
+            for frame in frames
+            if frame.problem is None and str(frame.path) not in left_out
+        ],
     }
 
 

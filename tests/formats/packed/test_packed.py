@@ -1,5 +1,6 @@
 """Sets in Parquet, against the folders that they were made of."""
 
+import os
 import pickle
 import shutil
 from pathlib import Path
@@ -226,7 +227,7 @@ DAMAGES = {
     "a shard that is not there": (
         "steps-00000-of-00001.parquet",
         lambda file: rewrite(file, no_shard),
-        "file -3 of frames is not there",
+        "no place of a file",
     ),
     "a dictionary": (
         ONE_TABLE,
@@ -304,3 +305,51 @@ def test_a_log_of_another_trajectory_is_refused(make_nieh_set):
     rewrite(packed / "steps-00000-of-00001.parquet", edit)
     with pytest.raises(DataError, match="digest"):
         read_steps(NiehSet(packed).folder("traj_a"))
+
+
+def test_links_pipes_and_strange_names_are_left_out_and_said(make_nieh_set, tmp_path):
+    root = make_nieh_set(size=32)
+    secret = tmp_path / "secret.txt"
+    secret.write_text("a secret")
+    folder = root / "metadata/traj_a"
+    (folder / "link.txt").symlink_to(secret)
+    (folder / "around").symlink_to(root)
+    (folder / "img" / "000000002.png").unlink()
+    (folder / "img" / "000000002.png").symlink_to(secret)
+    os.mkfifo(folder / "pipe.bin")
+    (root / "remote.json").write_text("{}")
+    (root / "more").mkdir()
+    out = tmp_path / "packed"
+    out.mkdir()
+    packed = pack_set(NiehSet(root), out)
+    assert {Path(path).name for path in packed.left_out} == {
+        *("link.txt", "around", "000000002.png", "pipe.bin", "remote.json", "more")
+    }
+    assert not any(b"a secret" in path.read_bytes() for path in out.iterdir())
+    assert NiehSet(out).questions
+
+
+@pytest.mark.parametrize("entries", ["[]", '[{"img_idx": 99999999999999999999}]'])
+def test_a_trajectory_that_no_table_holds_is_left_out(entries, make_nieh_set, tmp_path):
+    root = make_nieh_set(size=32)
+    (root / "metadata/traj_a/metadata.json").write_text(entries)
+    for picture in (root / "metadata/traj_a/img").iterdir():
+        picture.unlink()
+    out = tmp_path / "packed"
+    out.mkdir()
+    packed = pack_set(NiehSet(root), out)
+    assert (packed.n_trajectories, len(packed.damaged)) == (1, 1)
+
+
+@pytest.mark.parametrize("column", ["file", "n_bytes", "shard", "row_group", "row", "log"])
+def test_nothing_in_a_column_is_refused_in_one_line(column, make_nieh_set, tmp_path):
+    root = make_nieh_set(size=32)
+    for trajectory in (root / "metadata").iterdir():
+        write_steps(trajectory, read_steps(trajectory))
+    packed = pack(root)
+    rewrite(packed / "steps-00000-of-00001.parquet", lambda rows: rows[0].update({column: None}))
+    out = tmp_path / "saved"
+    out.mkdir()
+    saved = unpack_set(packed, out, skip_damaged=True)
+    assert (saved.n_trajectories, len(saved.damaged)) == (1, 1)
+    assert "\n" not in saved.damaged[0]

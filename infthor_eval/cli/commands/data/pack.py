@@ -89,6 +89,7 @@ def _finish(context: click.Context, packed: Packed, out: Path) -> None:
     print_line(
         f"{packed.n_trajectories} trajectories, {len(files)} files, {size / 1e6:.1f} MB: {out}"
     )
-    for line in packed.damaged:
-        error_console().print(f"left out: {line}", style="red")
+    files_left_out = (f"{path}: {reason}" for path, reason in packed.left_out.items())
+    for line in (*packed.damaged, *files_left_out):
+        error_console().print(f"left out: {line}", style="red", markup=False)
     context.exit(1 if packed.damaged else 0)
