@@ -52,6 +52,7 @@ _COMMANDS = {
         "table": "Compute a table of the paper from its published files.",
     },
     "Make data": {
+        "init-set": "Write an example of a set of your own films, frames and questions.",
         "generate": "Generate long-horizon trajectories in a scene.",
         "look-around": "Level the camera in the long walks of trajectories.",
         "replay": "Replay trajectories into frames and metadata.",

@@ -17,6 +17,7 @@ from infthor_eval.exports.gaps import describe_gaps, gap_notes, task_gaps
 from infthor_eval.exports.measures import Measure, find_measures
 from infthor_eval.exports.request import ExportRequest, Written
 from infthor_eval.exports.subjects import UNKNOWN, ModelFacts, model_facts
+from infthor_eval.formats.own_folder import OWN_FRAMES
 from infthor_eval.run import Run
 from infthor_eval.storage.files import file_name, write_atomically, writing_hint
 
@@ -95,12 +96,18 @@ def _notes(run: Run, facts: ModelFacts, measure: Measure, factor: int) -> str:
         f"not whole: {left_out}" if left_out else "",
         f"frames: {config.frames}" if config.frames not in ("", "shown") else "",
         f"limit {config.limit}" if config.limit is not None else "",
-        f"frames of the {run.simulator} simulator" if run.simulator else "",
+        _frames_of(run.simulator),
         f"revision {facts.revision}" if facts.revision else "",
         f"{facts.engine} {facts.engine_version}".strip(),
         f"{_FRAMEWORK} {config.infthor_eval}, config {config.hash}",
     ]
     return "; ".join(filter(None, parts))
+
+
+def _frames_of(simulator: str) -> str:
+    if simulator == OWN_FRAMES:
+        return simulator
+    return f"frames of the {simulator} simulator" if simulator else ""
 
 
 def _write_tasks(runs: Sequence[Run], request: ExportRequest) -> Path:

@@ -26,7 +26,7 @@ import msgspec
 from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.frames import FrameRef, find_images
 from infthor_eval.formats.outline import Outline, find_outline, read_outline, read_states
-from infthor_eval.formats.own_folder import OwnFolder, find_own_folder
+from infthor_eval.formats.own_folder import OWN_FRAMES, OwnFolder, find_own_folder
 from infthor_eval.formats.packed.paths import SetPath, metadata_folder
 from infthor_eval.formats.pictures.video import Video, read_video
 from infthor_eval.formats.qa_csv import read_questions
@@ -45,7 +45,7 @@ _NO_FRAMES = "has no metadata/ with frames; unpack the set's metadata.tar there"
 _GIVE_A_SET = (
     "give the folder of an NIEH set, or download the published one with `infthor-eval fetch nieh`"
 )
-_IMAGE_FOLDERS = ("img", "img_768")
+IMAGE_FOLDERS = ("img", "img_768")
 _REPLAY_HINT = "replay it again"
 
 
@@ -61,8 +61,8 @@ class NiehSet:
             inside the set.
         files: all questions by the name of their file, in its order, also those that cannot be
             asked; rows that are no question are `SkippedQuestion`.
-        simulator: simulator that rendered the frames ("embedded", "unity"), or None if the set does
-            not say.
+        simulator: simulator that rendered the frames ("embedded", "unity"), `OWN_FRAMES`, or None
+            if the set does not say.
     """
 
     def __init__(
@@ -99,7 +99,7 @@ class NiehSet:
                 "--trajectories"
             )
         self.trajectories = trajectories
-        self.simulator = simulator_of(self.directory)
+        self.simulator = OWN_FRAMES if self._own else simulator_of(self.directory)
         self.files = {file.stem: self._read_file(file) for file in self.question_files}
         self._shared_frames: dict[str, FrameRef] = {}
         self._frames: dict[str, dict[int, FrameRef] | DataError] = {}
@@ -123,7 +123,8 @@ class NiehSet:
             reason = "is in the files twice" if question.id in seen else self._problem(question)
             seen.add(question.id)
             rows.append(SkippedQuestion(question, reason) if reason else question)
-        return tuple(rows)
+        # Of a set of one's own a frame may be none: then the other question of its pair is left.
+        return tuple(rows if self._own is None else self._own.refuse_half_pairs(rows))
 
     @property
     def malformed(self) -> list[SkippedQuestion]:
@@ -166,7 +167,7 @@ class NiehSet:
         # Not the content of frames, which would mean reading all of it: a record has the digests of
         # its own frames.
         digest = hashlib.blake2b(digest_size=16)
-        for file in self.question_files:
+        for file in self.question_files if self._own is None else self._own.files:
             digest.update(file.read_bytes())
         if _have_pairs(self.questions) and self.twins:  # the pair tells a question's cluster
             digest.update(msgspec.json.encode(self.twins))
@@ -200,7 +201,7 @@ class NiehSet:
     def folder(self, traj_id: str) -> SetPath:
         """Return the folder of a trajectory's frames and metadata, that of all without a name."""
         if self._own is not None:
-            return self._own.folders.get(traj_id, self.directory)
+            return self._own.folder(traj_id)
         return self._metadata / traj_id
 
     def frames(self, traj_id: str) -> tuple[FrameRef, ...]:
@@ -408,7 +409,7 @@ def _read_frames(folder: SetPath, shared_frames: dict[str, FrameRef]) -> dict[in
     shared = read_shared_frames(folder, [step.img_idx for step in steps], shared_frames)
     if shared is not None:
         return shared
-    home = next((folder / name for name in _IMAGE_FOLDERS if (folder / name).is_dir()), folder)
+    home = next((folder / name for name in IMAGE_FOLDERS if (folder / name).is_dir()), folder)
     if home == folder and log_file(folder).exists():
         raise DataError(f"trajectory {folder.name}: neither img/ nor img_768/ in {folder}; {_HINT}")
     # By stem: published sets of other sizes (img_768) keep the names and change the suffix.

@@ -4,6 +4,8 @@ from PIL import Image
 from infthor_eval.errors import DataError
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.step_log import Layout, layout_of, read_steps
+from infthor_eval.nieh.scoring import score
+from infthor_eval.nieh.twins import paired_with
 
 
 @pytest.fixture
@@ -115,3 +117,70 @@ def test_a_question_file_of_the_published_form_beside_pictures_is_read_as_such(m
     (folder / "qa.csv").write_text(f"traj_id,question,gt_img_idx,answer\n{row}\n")
     (question,) = NiehSet(folder / "qa.csv").questions
     assert (question.traj_id, question.clues) == ("t", (3,))
+
+
+@pytest.mark.parametrize(
+    ("cell", "answers"),
+    [
+        ("plate | mug", ("plate", "mug")),
+        ('"[""plate"", 2]"', ("plate", 2)),
+        ('"plate, mug"', ("plate, mug",)),
+    ],
+)
+def test_several_answers_are_all_required(make_folder, cell, answers):
+    (question,) = NiehSet(make_folder(["1.png"], "question,answer", f"q,{cell}")).questions
+    assert question.answers == answers
+    assert score(", ".join(map(str, reversed(answers))), answers, "strict") == 1
+
+
+def test_a_pair_is_two_moments_of_a_trajectory(make_folder):
+    lines = ("q,table,1,2.png,mug", "q,sink,3,,mug", "r,no,,2,")
+    data = NiehSet(
+        make_folder(["1.png", "2.png", "3.png"], "question,answer,clue_frames,moment,pair", *lines)
+    )
+    first, second, alone = data.questions
+    assert [(row.moment, row.clues) for row in data.questions] == [
+        (1, (0,)), (2, (2,)), (1, (0, 1))
+    ]  # fmt: skip
+    assert paired_with(data, first) == second and not data.twins
+    assert alone.pair == ""
+
+
+@pytest.mark.parametrize(
+    ("lines", "reasons"),
+    [
+        (["a,q,x,1,p"], ["line 3: pair: 'p' is in 1 row; write it in those of its two questions"]),
+        (["a,q,x,1,p", "a,r,x,1,p", "a,s,x,1,p"], ["pair: 'p' is in 3 rows"] * 3),
+        (["a,q,x,1,p", "b,q,y,1,p"], ["pair: 'p' is on two trajectories"] * 2),
+        (["a,q,x,1,p", "a,q,x,1,p"], ["pair: both questions of 'p' are the same"] * 2),
+        (
+            ["a,q,x,1,p", "a,r,,1,p"],
+            ["line 3: pair: the other question of 'p' cannot be asked", "line 4: answer is empty"],
+        ),
+        # What only the file of a frame says.
+        (
+            ["a,q,x,1,p", "a,r,x,2,p"],
+            ["pair: the other question of 'p' cannot be asked", "not a PNG"],
+        ),
+    ],
+)
+def test_half_a_pair_is_not_asked(make_folder, lines, reasons):
+    names = ["a/1.png", "a/2.png", "b/1.png"]
+    header = "trajectory,question,answer,clue_frames,pair"
+    root = make_folder(names, header, "a,good,yes,1,", *lines)
+    (root / "a/2.png").write_text("broken")
+    data = NiehSet(root)
+    assert [row.text for row in data.questions] == ["good"]
+    for row, reason in zip(data.skipped, reasons, strict=True):
+        assert reason in row.reason
+    assert data.fingerprint
+
+
+@pytest.mark.parametrize("name", ["comment", "part", "moments", "pairs", "clue_second"])
+def test_short_columns_are_misspelt_only_where_that_is_plain(make_folder, name):
+    root = make_folder(["1.png"], f"question,answer,{name}", "q,a,b")
+    if name in ("comment", "part"):
+        assert NiehSet(root).questions
+        return
+    with pytest.raises(DataError, match="did you mean"):
+        NiehSet(root)

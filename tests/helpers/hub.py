@@ -8,9 +8,11 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from urllib.parse import parse_qs
 
+import pytest
+
 from .http_servers import SilentHandler, run_server
 
-__all__ = ["COMMIT", "Hub", "serve_hub"]
+__all__ = ["COMMIT", "Hub", "serve_hub", "use_hub"]
 
 COMMIT = "0" * 40
 
@@ -93,3 +95,13 @@ def serve_hub(repository: str, files: dict[str, bytes]) -> Iterator[tuple[str, t
     )
     with run_server(answers) as address:
         yield address, answers
+
+
+def use_hub(monkeypatch: pytest.MonkeyPatch, address: str) -> None:
+    """Let the hub's library ask the server at an address."""
+    monkeypatch.setattr("huggingface_hub.constants.ENDPOINT", address)
+    monkeypatch.setattr("huggingface_hub.hf_api.constants.ENDPOINT", address)
+    monkeypatch.setattr(
+        "huggingface_hub.constants.HUGGINGFACE_CO_URL_TEMPLATE",
+        address + "/{repo_id}/resolve/{revision}/{filename}",
+    )

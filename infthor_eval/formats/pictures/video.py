@@ -19,7 +19,7 @@ from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.packed.paths import SetPath
 from infthor_eval.formats.reading import require_file
-from infthor_eval.storage.digests import digest
+from infthor_eval.storage.digests import digest, digest_of_file
 from infthor_eval.storage.files import writing_hint
 from infthor_eval.storage.folders import user_cache
 from infthor_eval.storage.scratch import ScratchFolder
@@ -87,7 +87,8 @@ def read_video(path: SetPath, fps: float) -> Video:
 
     require_file(path, _HINT)
     with wrap_errors(f"{path}: cannot be read", _HINT):
-        content = digest(path.read_bytes())
+        # In pieces where it can be: films of one's own may be larger than the memory.
+        content = digest_of_file(path) if isinstance(path, Path) else digest(path.read_bytes())
     folder = user_cache("video_frames") / f"{content}-spread-{fps:g}fps-opencv{cv2.__version__}"
     if not _is_complete(folder):
         with wrap_errors(f"{folder}: cannot be written", writing_hint(", or set XDG_CACHE_HOME")):

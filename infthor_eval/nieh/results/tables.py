@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 from infthor_eval.facets import facet_table
+from infthor_eval.formats.own_folder import OWN_FRAMES
 from infthor_eval.formats.published import (
     PUBLISHED_DATA,
     PublishedRow,
@@ -99,7 +100,8 @@ def tables(runs: Sequence[RunSummary]) -> list[Table]:
     on true and on blank frames. Those of the evidence, of the effective length and of memories are
     there if a task shows part of a trajectory.
     """
-    contexts = {task.context for _, _, task in _tasks(runs)}
+    # Of tasks on one's own data no published row is shown: it is on other questions.
+    contexts = {task.context for _, _, task in _tasks(runs) if task.simulator != OWN_FRAMES}
     others = [
         _beside(table, runs)
         for table in published_tables("nieh")
@@ -211,7 +213,8 @@ def clues_table(runs: Sequence[RunSummary]) -> Table:
     numbers = (*CLUE_COLUMNS, "95 %", "bootstrap", *apart, "n", *_LEFT_OUT)
     rows = [row for run in runs for row in _rows_of(run, has_blind=has_blind)]
     notes = [*_LEGEND, *above_blind_notes(runs)]
-    for table in filter(_is_by_clues, published_tables("nieh")):
+    is_own = all(task.simulator == OWN_FRAMES for *_, task in _tasks(runs))
+    for table in () if is_own else filter(_is_by_clues, published_tables("nieh")):
         rows += _published_rows(table, runs)
         notes += table.notes
     columns = (*_NAMES, _METRIC, *map(Column, numbers))
@@ -219,7 +222,7 @@ def clues_table(runs: Sequence[RunSummary]) -> Table:
         "NIEH accuracy, % by number of clues (questions)",
         columns,
         tuple(rows),
-        (*notes, PUBLISHED_DATA, *_notes(runs)),
+        (*notes, *(() if is_own else (PUBLISHED_DATA,)), *_notes(runs)),
     )
 
 

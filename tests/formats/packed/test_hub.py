@@ -1,5 +1,7 @@
 """Sets on a hub that is a local server."""
 
+import json
+
 import pytest
 from PIL import Image
 
@@ -9,7 +11,8 @@ from infthor_eval.formats.packed.hub import set_folder
 from infthor_eval.formats.packed.writing import pack_set
 from infthor_eval.formats.question import Question
 from infthor_eval.formats.step_log import read_steps
-from tests.helpers.hub import COMMIT, serve_hub
+from tests.helpers.command_line import option_words, read_success
+from tests.helpers.hub import COMMIT, serve_hub, use_hub
 
 NAME = "me/my_set"
 N_TRAJECTORIES = 40
@@ -33,13 +36,25 @@ def hub(folder, tmp_path, monkeypatch):
     pack_set(NiehSet(folder), packed)
     files = {path.name: path.read_bytes() for path in packed.iterdir()}
     with serve_hub(f"datasets/{NAME}", files) as (address, answers):
-        monkeypatch.setattr("huggingface_hub.constants.ENDPOINT", address)
-        monkeypatch.setattr("huggingface_hub.hf_api.constants.ENDPOINT", address)
-        monkeypatch.setattr(
-            "huggingface_hub.constants.HUGGINGFACE_CO_URL_TEMPLATE",
-            address + "/{repo_id}/resolve/{revision}/{filename}",
-        )
+        use_hub(monkeypatch, address)
         yield answers
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "model", ["qwen2.5-vl-tiny", "llava-onevision-tiny", "pixtral-tiny", "deepseek-vl-tiny"]
+)
+def test_replies_of_a_run_are_those_of_the_folder(model, hub, run_cli, tmp_path):
+    """Of a run by the address, on an empty cache, against one on a folder."""
+    replies = []
+    for place in ("hf://me/my_set", tmp_path / "set"):
+        out = tmp_path / f"out-{len(replies)}"
+        words = option_words(model=model, tasks="nieh_gt", data=place, limit=4, out=out)
+        read_success(run_cli(*words))
+        (file,) = out.rglob("samples_*.jsonl")
+        replies.append([json.loads(line)["resps"] for line in file.read_text().splitlines()])
+        replies[-1].append(file.parent.name)  # it has the hash of the run's config
+    assert replies[0] == replies[1]
 
 
 def test_it_is_the_set_of_the_folder(hub, folder):
