@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 _RANDOM = "random weights, for trying the harness; scores are those of chance"
 _ANY = "any image-text model of transformers with a chat template (pretrained=NAME)"
+_ANY_TEXT = "any language model of transformers, for texts alone (pretrained=NAME)"
 _SERVED = "any model behind a server of this dialect (model=NAME)"
 _HTTP = "any policy behind a server of OpenVLA's convention, /act (url=ADDRESS)"
 _PERSON = "a person, who answers on a page of this machine"
@@ -119,6 +120,12 @@ BUILT_IN = {
     "gemma3": _named("google/gemma-3-12b-it", "gemma3"),
     "gemma4": _named("google/gemma-4-E4B-it", "gemma4", options="Gemma4Options"),
     "glm-4.6v": _named("zai-org/GLM-4.6V-Flash", "glm4v", "glm4v_moe", "glm46v"),
+    "hf-lm": _locate(
+        "hf.families.hf_lm:HfLm",
+        "options.checkpoints:CheckpointOptions",
+        _ANY_TEXT,
+        pretrained="",
+    ),
     "hf-vlm": _HF_VLM,
     "hf-vlm@vllm": _on_vllm("adapter:HfVlmOnVllm", "VllmOptions", _HF_VLM),
     "human": _locate("human.adapter:Human", "human.adapter:HumanOptions", _PERSON),

@@ -142,6 +142,8 @@ class Capabilities:
         deterministic: the same request gets the same reply, greedily or with the same seed.
         sampling: temperatures above 0 are supported.
         choices: replies can be restricted to given texts.
+        image_input: conversations take frames; if false, the model reads text alone, and a frame or
+            a video is refused.
         video_input: conversations take videos; if false, a video is refused, and its frames can be
             given as images.
         batch_size: continuations of a conversation that the model answers together.
@@ -159,6 +161,7 @@ class Capabilities:
     deterministic: bool = True
     sampling: bool = False
     choices: bool = False
+    image_input: bool = True
     video_input: bool = False
     batch_size: int = 1
     batch_contexts: bool = False

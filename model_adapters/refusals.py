@@ -34,12 +34,19 @@ def check_turns(name: str, capabilities: Capabilities, turns: Sequence[Turn]) ->
     """Check that it is this model's turn, and that it takes all parts of the conversation.
 
     Raises:
-        ModelError: the conversation is empty, its last turn is not the user's, or it has a video
-            and the model no video input.
+        ModelError: the conversation is empty, its last turn is not the user's, or it has frames or
+            a video and the model no input for them.
     """
     if not turns or turns[-1].role != "user":
         state = f"the last turn is the {turns[-1].role}'s" if turns else "the conversation is empty"
         raise ModelError(f"{name} has nothing to reply to: {state}; append a user turn")
+    if not capabilities.image_input and any(
+        not isinstance(part, str) for turn in turns for part in turn.parts
+    ):
+        raise ModelError(
+            f"{name} reads text alone, and this context has frames; leave them out (--frames "
+            "none), or ask a model with vision"
+        )
     if not capabilities.video_input and any(
         isinstance(part, Video) for turn in turns for part in turn.parts
     ):

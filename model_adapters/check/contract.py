@@ -32,6 +32,7 @@ from model_adapters.protocols import ArmDelta, Conversation, Decoding, Model, Pa
 _MOST_THREADS = 4
 _CHOICES = ("bright", "dark", "dark and bright")  # one is a prefix of another
 _INSTRUCTION = "pick up the mug"
+_TEXTS = ("A black picture.", "A white picture.")
 
 
 def check_adapter(adapter: Model | Policy, frame_size: tuple[int, int] = (300, 300)) -> None:
@@ -77,22 +78,27 @@ def model_checks(model: Model, black: FrameRef, white: FrameRef) -> dict[str, Ca
     return {
         "members": partial(check_members, model),
         "identity": partial(check_identity, model),
-        "parts": partial(_check_parts, model, black),
-        "counts": partial(_check_counts, model, black),
-        "marks": partial(_check_marks, model, black),
-        "reply": partial(_check_reply, model, black),
-        "turns": partial(_check_turns, model, black),
+        "parts": partial(_show, _check_parts, model, black),
+        "counts": partial(_show, _check_counts, model, black),
+        "marks": partial(_show, _check_marks, model, black),
+        "reply": partial(_show, _check_reply, model, black),
+        "turns": partial(_show, _check_turns, model, black),
         "frames": partial(_check_frames, model, black, white),
-        "sharing": partial(_check_sharing, model, black, white),
-        "continuations": partial(_check_continuations, model, black, white),
-        "sampling": partial(_check_sampling, model, black),
-        "choices": partial(_check_choices, model, black),
+        "sharing": partial(_show, _check_sharing, model, black, white),
+        "continuations": partial(_show, _check_continuations, model, black, white),
+        "sampling": partial(_show, _check_sampling, model, black),
+        "choices": partial(_show, _check_choices, model, black),
         "video": partial(_check_video, model, black, white),
-        "flight": partial(_check_flight, model, black, white),
+        "flight": partial(_show, _check_flight, model, black, white),
     }
 
 
-def _check_sampling(model: Model, frame: FrameRef) -> None:
+def _show(check: Callable[..., None], model: Model, *frames: FrameRef) -> None:
+    """Run a check on frames, or on texts in their place for a model that reads text alone."""
+    check(model, *(frames if model.capabilities.image_input else _TEXTS[: len(frames)]))
+
+
+def _check_sampling(model: Model, frame: Part) -> None:
     """Check that replies are sampled if the model claims to, and depend on the seed alone if it is
     deterministic."""
     decodings = [
@@ -117,7 +123,7 @@ def _check_sampling(model: Model, frame: FrameRef) -> None:
         require(all(map(same_reply, replies, again)), "the same seed does not give the same reply")
 
 
-def _check_choices(model: Model, frame: FrameRef) -> None:
+def _check_choices(model: Model, frame: Part) -> None:
     """Check that replies are restricted to choices if the model claims to support them."""
     decoding = Decoding(max_new_tokens=64, choices=_CHOICES)
     talk = start_conversation(model, frame, QUESTION)
@@ -161,7 +167,7 @@ def _check_video(model: Model, black: FrameRef, white: FrameRef) -> None:
         )
 
 
-def _check_flight(model: Model, black: FrameRef, white: FrameRef) -> None:
+def _check_flight(model: Model, black: Part, white: Part) -> None:
     """Check that several conversations can be answered at the same time if the model claims so."""
     n_threads = min(model.capabilities.max_in_flight, _MOST_THREADS)
     if n_threads == 1:
@@ -172,7 +178,7 @@ def _check_flight(model: Model, black: FrameRef, white: FrameRef) -> None:
         for frame in (black, white)
     ]
 
-    def answer(parts: tuple[FrameRef, str]) -> Reply:
+    def answer(parts: tuple[Part, str]) -> Reply:
         return ask(model, *parts)
 
     with ThreadPoolExecutor(n_threads) as pool:
@@ -183,7 +189,7 @@ def _check_flight(model: Model, black: FrameRef, white: FrameRef) -> None:
     require(alike, "replies to questions asked at the same time differ from those asked one by one")
 
 
-def _check_parts(model: Model, frame: FrameRef) -> None:
+def _check_parts(model: Model, frame: Part) -> None:
     """Check that texts and frames can be appended, and nothing else."""
     split = start_conversation(model, frame, "\nWhat do", " you see?")
     whole = start_conversation(model, frame, "\nWhat do you see?")
@@ -202,13 +208,14 @@ def _check_parts(model: Model, frame: FrameRef) -> None:
     require(_alike(model, split, whole), "a refused append() changes the conversation")
 
 
-def _check_counts(model: Model, frame: FrameRef) -> None:
-    """Check that token counts are exact if the model claims so, and None if it does not."""
+def _check_counts(model: Model, frame: FrameRef | str) -> None:
+    """Check that token counts are exact if the model claims so, and None if it does not; those of a
+    frame only where there are frames."""
     if not model.capabilities.counts_tokens:
         n_tokens = start_conversation(model, frame, QUESTION).n_tokens
         require(n_tokens is None, "n_tokens is not None though counts_tokens is false")
         require(
-            model.tokens_per_frame(frame) is None,
+            isinstance(frame, str) or model.tokens_per_frame(frame) is None,
             "tokens_per_frame() is not None though counts_tokens is false",
         )
         return
@@ -218,6 +225,8 @@ def _check_counts(model: Model, frame: FrameRef) -> None:
         talk.append(*parts)
         sizes.append(talk.n_tokens or 0)
     require(sizes == sorted(set(sizes)), f"n_tokens does not grow with every part: {sizes}")
+    if isinstance(frame, str):
+        return
     per_frame = model.tokens_per_frame(frame) or 0
     require(
         0 < per_frame <= sizes[1] - sizes[0],
@@ -225,7 +234,7 @@ def _check_counts(model: Model, frame: FrameRef) -> None:
     )
 
 
-def _check_turns(model: Model, frame: FrameRef) -> None:
+def _check_turns(model: Model, frame: Part) -> None:
     """Check that turns are kept apart, and that the model replies to a user turn only."""
     _check_nothing_to_reply_to(model.conversation(), "an empty conversation")
     talk = start_conversation(model, frame, QUESTION)
@@ -241,7 +250,7 @@ def _check_turns(model: Model, frame: FrameRef) -> None:
     _check_system(model, frame)
 
 
-def _check_marks(model: Model, frame: FrameRef) -> None:
+def _check_marks(model: Model, frame: Part) -> None:
     """Check marks and rewinding."""
     talk = start_conversation(model, frame, QUESTION)
     unchanged = start_conversation(model, frame, QUESTION)
@@ -270,7 +279,7 @@ def _check_nothing_to_reply_to(talk: Conversation, what: str) -> None:
     require(refuses, f"reply() to {what} does not raise ModelError; call check_turns first")
 
 
-def _check_system(model: Model, frame: FrameRef) -> None:
+def _check_system(model: Model, frame: Part) -> None:
     talk = model.conversation()
     talk.append("Be brief.", role="system")
     _check_nothing_to_reply_to(talk, "a conversation whose last turn is the system's")
@@ -335,7 +344,7 @@ def _check_chunk(chunk: tuple[ArmDelta, ...]) -> None:
         )
 
 
-def _check_reply(model: Model, frame: FrameRef) -> None:
+def _check_reply(model: Model, frame: Part) -> None:
     """Check one reply: its counts and ids, its length, its stop strings."""
     talk = start_conversation(model, frame, QUESTION)
     size = talk.n_tokens
@@ -355,7 +364,14 @@ def _check_reply(model: Model, frame: FrameRef) -> None:
 
 
 def _check_frames(model: Model, black: FrameRef, white: FrameRef) -> None:
-    """Check that the model sees the frames."""
+    """Check that the model sees the frames, or refuses them if it reads text alone."""
+    if not model.capabilities.image_input:
+        refuses = raises(ModelError, start_conversation(model, black, QUESTION).reply, GREEDY)
+        require(
+            refuses,
+            "a frame does not raise ModelError though image_input is false; call check_turns first",
+        )
+        return
     # Equal replies to one question may be chance, so one of several replies has to differ.
     questions = [
         QUESTION,
@@ -371,7 +387,7 @@ def _check_frames(model: Model, black: FrameRef, white: FrameRef) -> None:
     )
 
 
-def _check_sharing(model: Model, black: FrameRef, white: FrameRef) -> None:
+def _check_sharing(model: Model, black: Part, white: Part) -> None:
     """Check that a reply does not depend on what was asked before."""
     talk = start_conversation(model, black, white)
     start = talk.mark()
@@ -386,7 +402,7 @@ def _check_sharing(model: Model, black: FrameRef, white: FrameRef) -> None:
     require(alike, "a reply after a rewind differs from that of a new conversation")
 
 
-def _check_continuations(model: Model, black: FrameRef, white: FrameRef) -> None:
+def _check_continuations(model: Model, black: Part, white: Part) -> None:
     """Check that several continuations get the replies that each of them gets alone."""
     talk = start_conversation(model, black)
     continuations: list[list[Part]] = [

@@ -83,6 +83,7 @@ class HfModel(CheckpointModel):
         return Capabilities(
             sampling=True,
             choices=True,
+            image_input=self._prompter.takes_frames,
             video_input=self._prompter.takes_videos,
             batch_size=self._batch_size,
             max_tokens=self._context_limit,

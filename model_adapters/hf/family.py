@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from model_adapters.hf.prompting.embedding import Embed
 
 Size = tuple[int, int]  # width, height in pixels
+NO_TOKEN = -1  # in place of a token id
 Pixels = Mapping[str, torch.Tensor]  # what an image processor makes of a frame or a clip
 
 
@@ -61,7 +62,8 @@ class Family(Protocol):
     """Conversion of frames to tokens, features and positions for a loaded model.
 
     Attributes:
-        placeholder_id: token id of a frame in the tokenised chat template.
+        placeholder_id: token id of a frame in the tokenised chat template; `NO_TOKEN` for a family
+            that takes no frames.
         slot_id: token id whose embeddings are replaced by the frame's features.
         video: conversion of videos, or None for a family without a video input.
     """

@@ -60,3 +60,12 @@ def test_a_video_needs_a_video_input(tmp_path):
         ModelError, match="m has no video input; give it the video's frames as images"
     ):
         check_turns("m", Capabilities(), turns)
+
+
+def test_frames_need_an_image_input(tmp_path):
+    frame = FrameRef(tmp_path / "a.png")
+    blind = Capabilities(image_input=False)
+    check_turns("m", blind, user("What?"))
+    for part in (frame, Video((frame,), 1.0)):
+        with pytest.raises(ModelError, match="m reads text alone, and this context has frames"):
+            check_turns("m", blind, user(part, "What?"))

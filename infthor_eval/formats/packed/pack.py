@@ -60,6 +60,11 @@ class _Steps:
     rows: Mapping[str, range]
 
 
+def _is_name(part: str) -> bool:
+    """Return True for what a file can be called anywhere."""
+    return part not in {"", ".", ".."} and "\0" not in part and len(part.encode()) < 256
+
+
 def _size(size: Sequence[int | None]) -> ImageSize | None:
     width, height = size
     return None if width is None or height is None else (width, height)
@@ -88,6 +93,8 @@ class ParquetPack:
         self.root = root
         self._store: Store = HubStore(root) if is_remote(root) else LocalStore(root)
         self._tables = {table: Shards(table, self._store) for table in READ}
+        self._is_checked = check
+        self.refused: list[str] = []  # why trajectories are not read, of a set that is not checked
         if check:
             for shards in self._tables.values():
                 shards.check()
@@ -203,12 +210,23 @@ class ParquetPack:
     def _trajectories(self) -> Mapping[str, Mapping[str, Any]]:
         table = self._tables["trajectories"]
         names = ("traj_id", "shard", "row_group", "files")
-        rows = [row for at in table.groups() for row in table.read(*at, names).to_pylist()]
-        by_name = {row["traj_id"]: row for row in rows}
-        if len(by_name) < len(rows):
-            raise DataError(f"{self.root}: has rows of a trajectory twice; {HINT}")
-        for name in by_name:
-            self._check_name(name, 1)
+        by_name: dict[str, Mapping[str, Any]] = {}
+        n_rows = 0
+        for place in table.groups():
+            with wrap_errors(f"{self.root}: its trajectories cannot be read", HINT, catch=DAMAGED):
+                rows = table.read(*place, names).to_pylist()
+            by_name |= {row["traj_id"]: row for row in rows}
+            n_rows += len(rows)
+            if len(by_name) < n_rows:
+                raise DataError(f"{self.root}: has rows of a trajectory twice; {HINT}")
+        for name in list(by_name):
+            try:
+                self._check_name(name, 1)
+            except DataError as error:
+                if self._is_checked:
+                    raise
+                self.refused.append(str(error))
+                del by_name[name]
         return by_name
 
     def _read_trajectory(self, traj_id: str) -> Mapping[str, _Entry]:
@@ -222,8 +240,13 @@ class ParquetPack:
                 for name, frame in group.frames.get(traj_id, {}).items():
                     if self._check_name(name).startswith(f"{SHARED}/"):
                         shared[name.removeprefix(f"{SHARED}/")] = frame
+                    elif name in files:
+                        raise DataError(f"{self.root}: {traj_id} has {name} twice; {HINT}")
                     else:
                         files[name] = frame
+                folders = {str(above) for name in files for above in PurePosixPath(name).parents}
+                if both := sorted(folders & files.keys()):
+                    raise DataError(f"{self.root}: {traj_id}/{both[0]} is a file and a folder")
             self._files[traj_id] = files
             self._shared_by[traj_id] = shared
             self._shared |= shared
@@ -264,7 +287,7 @@ class ParquetPack:
     def _check_name(self, name: object, most: int = _DEEPEST) -> str:
         """Return a path within the set that cannot lead out of it."""
         parts = name.split("/") if isinstance(name, str) else [""]
-        if len(parts) > most or any(part in {"", ".", ".."} or "\0" in part for part in parts):
+        if len(parts) > most or not all(map(_is_name, parts)):
             raise DataError(f"{self.root}: {name!r:.80} is no path within a set; {HINT}")
         return str(name)
 

@@ -17,6 +17,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from infthor_eval.errors import DataError, wrap_errors
+from infthor_eval.formats.reading import file_problem
 from infthor_eval.storage.limits import FILE_MB
 
 _IMAGE = pa.struct({"bytes": pa.binary(), "path": pa.string()})
@@ -89,9 +90,12 @@ SCHEMAS = {
         }
     ),
 }
+_ENCODINGS = {"PLAIN", "RLE", "BIT_PACKED"}
 _SHARD = re.compile(r"([a-z]+)-(\d{5})-of-(\d{5})\.parquet")
 _LARGEST_GROUP = 2**20  # rows
-_KEPT = 6  # row groups, decoded
+_MOST_VALUES = 2**22  # in a column of a row group
+_MOST_SHARDS = 100_000
+_KEPT = 2**28  # bytes of row groups, decoded
 HINT = "pack the set again, or save what is whole: infthor-eval unpack --skip-damaged"
 
 # What pyarrow raises on damaged and forged files. RuntimeError: thrift's.
@@ -144,7 +148,14 @@ class LocalStore:
         return [path.name for path in self.root.glob("*.parquet")]
 
     def open(self, name: str) -> str:
-        """Return a file's path."""
+        """Return a file's path.
+
+        Raises:
+            OSError: it is no file; a pipe would block.
+        """
+        problem = file_problem(self.root / name)
+        if problem is not None:
+            raise OSError(problem)
         return str(self.root / name)
 
 
@@ -157,22 +168,14 @@ class Shards:
     """The files of one table."""
 
     def __init__(self, table: str, store: Store) -> None:
-        """Find them; none is opened.
-
-        Raises:
-            DataError: one is missing.
-        """
+        """Find them; none is opened."""
         self._table = table
         self._schema = SCHEMAS[table]
         self._store = store
         found = [match for name in store.names() if (match := _SHARD.fullmatch(name))]
-        own = sorted(match[0] for match in found if match[1] == table)
-        self._names = [shard_name(table, at, len(own)) for at in range(len(own))]
-        if own != self._names:
-            expected = own[-1].split("-of-")[-1].removesuffix(".parquet")
-            raise DataError(
-                f"{store.root}: has {len(own)} of {expected} files {table}-*.parquet; {HINT}"
-            )
+        self._found = sorted(match[0] for match in found if match[1] == table)
+        n_shards = min(max((int(it[3]) for it in found if it[1] == table), default=0), _MOST_SHARDS)
+        self._names = [shard_name(table, at, n_shards) for at in range(n_shards)]
         self._files: dict[str, pq.ParquetFile] = {}
         self._read: OrderedDict[tuple[object, ...], pa.Table] = OrderedDict()
         self._lock = Lock()  # pyarrow's readers are not made for several threads
@@ -181,8 +184,13 @@ class Shards:
         """Open all files.
 
         Raises:
-            DataError: one cannot be opened, or has other columns.
+            DataError: one is missing, cannot be opened, or has other columns.
         """
+        if self._found != self._names:
+            raise DataError(
+                f"{self._store.root}: has {len(self._found)} of {len(self._names)} files "
+                f"{self._table}-*.parquet; {HINT}"
+            )
         for name in self._names:
             self._open(name)
 
@@ -203,7 +211,7 @@ class Shards:
                 self._read.move_to_end(key)
                 return self._read[key]
             self._read[key] = table = self._decode(shard, row_group, columns)
-            if len(self._read) > _KEPT:
+            while len(self._read) > 1 and sum(it.nbytes for it in self._read.values()) > _KEPT:
                 self._read.popitem(last=False)
             return table
 
@@ -228,13 +236,6 @@ class Shards:
     def _check_size(self, path: Path, group: pq.RowGroupMetaData) -> None:
         """Refuse a row group that would fill the memory."""
         columns = [group.column(at) for at in range(group.num_columns)]
-        # A long value in a dictionary can stand for a million; those that we write are not so
-        # encoded.
-        dictionaries = [
-            column.path_in_schema
-            for column in columns
-            if column.has_dictionary_page and column.physical_type == "BYTE_ARRAY"
-        ]
         n_bytes = sum(column.total_uncompressed_size for column in columns)
         n_bytes = max(n_bytes, group.total_byte_size)
         if group.num_rows > _LARGEST_GROUP or n_bytes > FILE_MB.value * 2**20:
@@ -242,8 +243,12 @@ class Shards:
                 f"{path}: a row group of {group.num_rows:,} rows and {n_bytes:,} bytes is too "
                 f"large; {FILE_MB.hint}"
             )
-        if dictionaries:
-            raise DataError(f"{path}: {dictionaries[0]} is encoded by a dictionary; {HINT}")
+        for column in columns:
+            # In others a long value can stand for a million; ours are not so encoded.
+            others = set(column.encodings) - _ENCODINGS
+            if others or column.num_values > _MOST_VALUES:
+                what = f"encoded as {min(others)}" if others else f"{column.num_values:,} values"
+                raise DataError(f"{path}: {column.path_in_schema} is {what}; {HINT}")
 
     def _open(self, name: str) -> pq.ParquetFile:
         if name not in self._files:

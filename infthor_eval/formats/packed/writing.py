@@ -7,6 +7,7 @@ take a few bytes each where they are nearly equal.
 
 import shutil
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import chain, islice, zip_longest
 from pathlib import Path
@@ -36,6 +37,7 @@ An NIEH set of infthor-eval in Parquet; `infthor-eval card` writes a whole card 
 _SHARD_BYTES = 500_000_000
 _FRAMES = 32  # in a row group: what is fetched for one of them
 _QUESTIONS = 256  # in a row group
+_LARGE_PART = 2**26  # bytes of a row group of files
 _LARGE_FILE = 2**22  # bytes; it is a row group by itself
 _LARGEST = 2**63  # a number that no column can hold
 _LARGEST_FILE = 2**31 - 2  # bytes that a column cannot hold
@@ -125,7 +127,7 @@ def unpack_set(root: Path, out: Path, *, skip_damaged: bool) -> Packed:
         OSError: a file cannot be written.
     """
     pack = ParquetPack(root, check=not skip_damaged)
-    unpacked = Packed()
+    unpacked = Packed(damaged=pack.refused)
     for folder in pack.metadata.iterdir():
         try:
             _copy_files(folder, out / METADATA / folder.name)
@@ -350,7 +352,8 @@ class _Group:
         return what each trajectory's row says of them."""
         frames = {str(frame.path) for frame in self._pictures}
         listed: dict[str, list[dict[str, Any]]] = {}
-        parts: list[list[dict[str, Any]]] = [[]]  # all small ones are a row group
+        parts: list[list[dict[str, Any]]] = [[]]  # row groups
+        n_bytes = 0
         for name, log in logs.items():
             folder = self._data.folder(name)
             listed[name] = [] if log.content is None else [_listed(LOG, log.content)]
@@ -362,10 +365,11 @@ class _Group:
                 inside = str(path).removeprefix(f"{folder}/")
                 content = path.read_bytes()
                 row = {"traj_id": name, "name": inside, "content": content}
-                if len(content) > _LARGE_FILE:
-                    parts.append([row])
-                else:
-                    parts[0].append(row)
+                n_bytes += len(content)
+                if len(content) > _LARGE_FILE or n_bytes > _LARGE_PART:
+                    parts.append([])
+                    n_bytes = len(content)
+                parts[-1].append(row)
         for part in filter(None, parts):
             place = self._tables.write("files", part)
             for at, entry in enumerate(part):
@@ -405,10 +409,13 @@ class _Group:
 
     def _trajectory(self, name: str, files: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         world = self._data.twins.get(name)
-        outline = None if world else self._data.outline(name)
+        scene = world.floor_plan if world else None
+        with suppress(DataError):  # contexts that need it say so
+            outline = self._data.outline(name)
+            scene = scene or (outline.floor_plan if outline else None)
         return {
             "traj_id": name,
-            "scene": world.floor_plan if world else outline and outline.floor_plan,
+            "scene": scene,
             "base": world.base if world else None,
             "n_frames": len(self._frames[name]),
             "files": files,

@@ -54,6 +54,18 @@ def check_loaded(model: TransformersModel | UncachedModel, processor: Any, pretr
             model.try_generate(turns)
 
 
+@torch.inference_mode()
+def check_text(model: TransformersModel, pretrained: str) -> None:
+    """Try a checkpoint that reads text alone, likewise."""
+    kind = model.loaded.model.config.model_type
+    pieces = model.pieces([Turn("user", ("The first view:\nRotateLeft\nWhat do you see?",))])
+    device = model.loaded.model.get_input_embeddings().weight.device
+    inputs = {"input_ids": torch.tensor([[*token_ids(pieces)]], device=device)}
+    _compare_logits(model, pieces, inputs, pretrained, f"{kind} needs code of its own")
+    _check_together(model, "The first view:\n", pretrained)
+    model.forget()  # requests begin as they do without samples
+
+
 def require_same_ids(loaded: LoadedCheckpoint, processor: Any, pretrained: str, hint: str) -> None:
     """Refuse a checkpoint whose processor makes other token ids of a sample than the parts of a
     conversation have.
@@ -77,6 +89,16 @@ def _check_shared(
         pieces = model.pieces(turns)
     inputs = _inputs(loaded, turns, processor, pretrained)
     _compare_ids(pieces, inputs, f"{kind} cannot be run with shared prefixes; {hint}")
+    _compare_logits(model, pieces, inputs, pretrained, hint)
+
+
+def _compare_logits(
+    model: TransformersModel, pieces: list[Piece], inputs: Any, pretrained: str, hint: str
+) -> None:
+    """Raise `ModelError` unless pieces have the logits of the plain model on the inputs."""
+    loaded = model.loaded
+    kind = loaded.model.config.model_type
+    problem = f"{pretrained}: {kind} cannot be run with shared prefixes"
     # First the plain model: if it fails, too, the parts do not belong together.
     plain = _plain_logits(loaded, inputs, pretrained)
     try:

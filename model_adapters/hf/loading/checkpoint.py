@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Generic, TypeVar, cast
+from typing import Any, Generic, TypeVar
 
 import PIL
 import tokenizers
@@ -50,12 +50,23 @@ class LocatedCheckpoint(Generic[R_co]):
         commit: commit of the hub's repository, or None for a folder of the user's.
         config: config of the model.
         options: options of the model.
+        has_vision: False for a language model alone, which has no image processor.
     """
 
     folder: Path
     commit: str | None
     config: Any
     options: R_co
+    has_vision: bool = True
+
+    @property
+    def auto_class(self) -> Any:
+        """Class of transformers that finds the model's."""
+        return (
+            transformers.AutoModelForImageTextToText
+            if self.has_vision
+            else transformers.AutoModelForCausalLM
+        )
 
 
 def locate(options: R) -> LocatedCheckpoint[R]:
@@ -96,8 +107,10 @@ def read_checkpoint(
     folder = located.folder
     remote = {"trust_remote_code": options.trust_remote_code}
     with wrap_loading_errors(options.pretrained):
-        image_processor = load_image_processor(
-            folder, options, **remote, **options.image_settings()
+        image_processor = (
+            load_image_processor(folder, options, **remote, **options.image_settings())
+            if located.has_vision
+            else None
         )
         tokenizer = transformers.AutoTokenizer.from_pretrained(folder, **remote)
         template = chat_template(folder, tokenizer) if options.prompt == "chat" else None
@@ -121,7 +134,7 @@ def build_meta_model(located: LocatedCheckpoint[Any]) -> Any:
     It is enough for counting a frame's tokens, if another engine has the weights.
     """
     with torch.device("meta"):
-        model = cast(Any, transformers.AutoModelForImageTextToText).from_config(
+        model = located.auto_class.from_config(
             located.config, trust_remote_code=located.options.trust_remote_code
         )
     if (located.folder / _GENERATION).is_file():
@@ -140,7 +153,6 @@ def assemble(
     origin: Mapping[str, Any],
 ) -> LoadedCheckpoint:
     """Combine loaded parts and derive their identity, which begins with the weights' `origin`."""
-    _check_pixels(image_processor)
     pack_attention(model)
     # torch rounds convolutions in float32 to ten bits on a GPU, and vision towers begin with one.
     torch.backends.cudnn.allow_tf32 = False
@@ -152,13 +164,11 @@ def assemble(
         "quantization": _quantization_method(model),
         "attn_implementation": model.config.get_text_config()._attn_implementation,
         "rope": getattr(model.config.get_text_config(), "rope_parameters", None),
-        "image_processor": json.loads(image_processor.to_json_string()),
         "chat_template": digest(template),
         "versions": versions(),
     }
-    # Where it is not installed, the same is computed without it.
-    if image_backend(image_processor) == "torchvision" and is_torchvision_available():
-        identity["image_backend"] = f"torchvision {version('torchvision')}"
+    if image_processor is not None:
+        identity |= _image_identity(image_processor)
     return LoadedCheckpoint(
         model=model.eval(),
         tokenizer=tokenizer,
@@ -169,6 +179,16 @@ def assemble(
         max_tokens=max_tokens,
         identity=identity,
     )
+
+
+def _image_identity(image_processor: Any) -> dict[str, Any]:
+    """Return what an identity says of an image processor, whose settings are checked."""
+    _check_pixels(image_processor)
+    identity = {"image_processor": json.loads(image_processor.to_json_string())}
+    # Where it is not installed, the same is computed without it.
+    if image_backend(image_processor) == "torchvision" and is_torchvision_available():
+        identity["image_backend"] = f"torchvision {version('torchvision')}"
+    return identity
 
 
 def _check_pixels(image_processor: Any) -> None:
@@ -270,8 +290,9 @@ def _load_model(located: LocatedCheckpoint[CheckpointOptions]) -> Any:
     text = located.config.get_text_config()
     # Gemma 2 caps its scores, which torch's kernel cannot.
     if attention == "sdpa" and getattr(text, "attn_logit_softcapping", None):
-        attention = {"": "sdpa", "text_config": "eager"}
-    model, report = cast(Any, transformers.AutoModelForImageTextToText).from_pretrained(
+        is_whole = text is located.config  # a language model alone
+        attention = "eager" if is_whole else {"": "sdpa", "text_config": "eager"}
+    model, report = located.auto_class.from_pretrained(
         located.folder,
         config=located.config,
         dtype=resolve_dtype(options),

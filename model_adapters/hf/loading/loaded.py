@@ -17,7 +17,7 @@ class LoadedCheckpoint:
     Attributes:
         model: the transformers model, in evaluation mode.
         tokenizer: tokenizer of the model.
-        image_processor: image processor of the model.
+        image_processor: image processor of the model; None for one that reads text alone.
         template: template of conversations (Jinja): the checkpoint's chat template, or a plain one.
         family: family of the model.
         generation: end tokens and penalties.

@@ -14,7 +14,7 @@ from typing import Any
 from infthor_eval.errors import DataError, ModelError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.pictures.video import Video
-from model_adapters.hf.family import ClipShape, Family, Size, VideoInput
+from model_adapters.hf.family import NO_TOKEN, ClipShape, Family, Size, VideoInput
 from model_adapters.hf.prompting.rendering import Marks, render, starts_with_bos, writes_videos
 from model_adapters.protocols import Turn
 
@@ -117,9 +117,17 @@ class Prompter:
             if family.video is None
             else tokenizer.convert_ids_to_tokens(family.video.placeholder_id)
         )
-        self._marks = Marks(tokenizer.convert_ids_to_tokens(family.placeholder_id), video)
+        image = (
+            tokenizer.convert_ids_to_tokens(family.placeholder_id) if self.takes_frames else None
+        )
+        self._marks = Marks(image, video)
         self._frames: dict[str, Frame] = {}
         self._ids: dict[Size, tuple[int, ...]] = {}
+
+    @property
+    def takes_frames(self) -> bool:
+        """True if the family takes frames."""
+        return self._family.placeholder_id != NO_TOKEN
 
     @cached_property
     def takes_videos(self) -> bool:

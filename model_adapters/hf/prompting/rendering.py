@@ -42,10 +42,10 @@ _LOCK = Lock()
 
 @dataclass(frozen=True)
 class Marks:
-    """Tokens that stand for a frame and for a video in the text of a template; `video` is None if
-    there is none."""
+    """Tokens that stand for a frame and for a video in the text of a template; None where there is
+    none."""
 
-    image: str
+    image: str | None
     video: str | None = None
 
     def of(self, part: Part) -> str:
@@ -53,7 +53,7 @@ class Marks:
         without its edges."""
         if isinstance(part, Video):
             return self.video or ""
-        return self.image if isinstance(part, FrameRef) else part.strip()
+        return (self.image or "") if isinstance(part, FrameRef) else part.strip()
 
 
 def render(tokenizer: Any, template: str, turns: Sequence[Turn], marks: Marks) -> str:
@@ -62,7 +62,7 @@ def render(tokenizer: Any, template: str, turns: Sequence[Turn], marks: Marks) -
     Some templates (LLaVA's) write all images of a turn before its texts. If that would move frames
     or videos away from between the texts, the turn is passed as one text that contains their
     tokens. Some templates (Pixtral's) accept a system turn only as a string instead of a list of
-    texts.
+    texts; those of models without images are made for strings.
     """
     trials = [_render_alone(tokenizer, template, turn) for turn in turns]
     ordered = [
@@ -70,14 +70,20 @@ def render(tokenizer: Any, template: str, turns: Sequence[Turn], marks: Marks) -
     ]
     if len(turns) == 1 and trials[0] is not None and ordered[0] == replace(turns[0], role="user"):
         return trials[0]  # the trial rendered the whole conversation
-    with_lists = [_message(turn) for turn in ordered]
+    forms = [
+        [_message(turn) for turn in ordered],
+        [
+            _message(turn) if marks.image and turn.role == "user" else _string_message(turn)
+            for turn in ordered
+        ],
+    ]
+    first, second = forms if marks.image else reversed(forms)
     try:
-        return _apply(tokenizer, template, ordered, with_lists)
+        return _apply(tokenizer, template, ordered, first)
     except ModelError:
-        with_strings = [_string_message(turn) for turn in ordered]
-        if with_strings == with_lists:
+        if first == second:
             raise
-    return _apply(tokenizer, template, ordered, with_strings)
+    return _apply(tokenizer, template, ordered, second)
 
 
 def starts_with_bos(tokenizer: Any, text: str) -> bool:
@@ -116,11 +122,13 @@ def _render_alone(tokenizer: Any, template: str, turn: Turn) -> str | None:
 def prompt_end(tokenizer: Any, template: str) -> str:
     """Return what the template writes behind a user's turn; empty if it needs frames there."""
     probe = "?"
-    try:
-        text = _apply(tokenizer, template, (turn := Turn("user", (probe,)),), [_message(turn)])
-    except ModelError:
-        return ""
-    return text.rpartition(probe)[2]
+    turn = Turn("user", (probe,))
+    for message in (_message(turn), _string_message(turn)):
+        try:
+            return _apply(tokenizer, template, (turn,), [message]).rpartition(probe)[2]
+        except ModelError:
+            continue
+    return ""
 
 
 def _with_frames_in_place(turn: Turn, trial: str | None, marks: Marks) -> Turn:
@@ -152,10 +160,10 @@ def _content_part(part: Part) -> dict[str, str]:
 
 
 def _string_message(turn: Turn) -> dict[str, Any]:
-    text = turn.parts[0]
-    if turn.role == "user" or len(turn.parts) > 1 or not isinstance(text, str):
+    texts = [part for part in turn.parts if isinstance(part, str)]
+    if len(texts) < len(turn.parts):
         return _message(turn)
-    return {"role": turn.role, "content": text}
+    return {"role": turn.role, "content": "".join(texts)}
 
 
 def _apply(

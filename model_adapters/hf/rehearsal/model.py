@@ -21,9 +21,9 @@ from transformers import PreTrainedTokenizerFast
 from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.formats.yaml_files import read_yaml
 from infthor_eval.storage.scratch import ScratchFolder
+from model_adapters.hf.families.hf_lm import TextFamily
 from model_adapters.hf.families.hf_vlm import HfVlm, ProcessorFamily, family_of
-from model_adapters.hf.families.plain import PlainFamily, three_axis_positions
-from model_adapters.hf.family import Family, Pixels, Shape, Size
+from model_adapters.hf.family import Family
 from model_adapters.hf.loading.checkpoint import (
     LocatedCheckpoint,
     build_meta_model,
@@ -32,10 +32,6 @@ from model_adapters.hf.loading.checkpoint import (
 )
 from model_adapters.hf.loading.processors import load_processor
 from model_adapters.hf.loading.rope import apply_rope
-from model_adapters.hf.prompting.ahead import Ahead, PixelsAhead, read_pixels
-from model_adapters.hf.prompting.embedding import Embed
-from model_adapters.hf.prompting.features import FeatureCache
-from model_adapters.hf.prompting.native import EncodedImage, NativeEmbedder
 from model_adapters.hf.rehearsal.device import ShapesDevice
 from model_adapters.hf.uncached import expand_image_tokens
 from model_adapters.options.checkpoints import CheckpointOptions
@@ -43,36 +39,6 @@ from model_adapters.options.checkpoints import CheckpointOptions
 _CONFIG = "config.json"
 _TABLE = Path(__file__).with_name("checkpoints.yaml")
 _UNKNOWN = "<unk>"
-
-
-class _TextFamily(PlainFamily):
-    """What is left of a family whose processor cannot be built: text."""
-
-    def __init__(self, model: Any) -> None:
-        self._model = model
-        self.video = None
-        self.mask_types: Mapping[str, Mapping[int, int]] = {}
-        self.token_types: Mapping[str, Mapping[int, int]] = {}
-
-    def frame_ids(self, size: Size) -> tuple[int, ...]:
-        """Refuse frames."""
-        raise NotImplementedError
-
-    def positions(self, ids: torch.Tensor, shapes: Sequence[Shape], start: int) -> torch.Tensor:
-        """Return the positions of text, on as many axes as the model's."""
-        core = getattr(self._model, "model", self._model)
-        if hasattr(core, "get_rope_index"):
-            return three_axis_positions(core, ids, -1, None, start)
-        return super().positions(ids, shapes, start)
-
-    def make_embed(self, max_bytes: int, ahead: Ahead) -> Embed:
-        """Return what prepares spans of text."""
-        pixels = PixelsAhead(partial(read_pixels, self), ahead)
-        return NativeEmbedder(self._model, self, FeatureCache(pixels, self.encode, max_bytes))
-
-    def encode(self, frames: Sequence[Pixels]) -> list[EncodedImage]:
-        """Refuse frames."""
-        raise NotImplementedError
 
 
 @dataclass(frozen=True)
@@ -147,7 +113,7 @@ def _load(options: CheckpointOptions, source: str) -> RehearsedModel:
         limit = apply_rope(located.config, options.rope)
         device = ShapesDevice()  # the error may keep a first model
         model = _build(located, device)
-        text = _TextFamily(model)
+        text = TextFamily(model)
         return RehearsedModel(
             model, text, options, device, device.allocated, source, limit, problem=str(error)
         )

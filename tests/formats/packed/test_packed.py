@@ -206,7 +206,7 @@ DAMAGES = {
     "two of three": (
         ONE_TABLE,
         lambda file: file.rename(file.with_name("frames-00001-of-00003.parquet")),
-        "has 1 of 00003 files frames-",
+        "has 1 of 3 files frames-",
     ),
     "other pictures": (ONE_TABLE, lambda file: rewrite(file, swap_pictures), "digest"),
     "a path that leads out": (
@@ -229,10 +229,26 @@ DAMAGES = {
         lambda file: rewrite(file, no_shard),
         "no place of a file",
     ),
+    "a pipe": (ONE_TABLE, lambda file: (file.unlink(), os.mkfifo(file)), "is a pipe"),
+    "values by their prefixes": (
+        "steps-00000-of-00001.parquet",
+        lambda file: pq.write_table(
+            pq.read_table(file),
+            file,
+            use_dictionary=False,
+            column_encoding={"log": "DELTA_BYTE_ARRAY"},
+        ),
+        "log is encoded as DELTA_BYTE_ARRAY",
+    ),
+    "a file that is a folder, too": (
+        "trajectories-00000-of-00001.parquet",
+        lambda file: rewrite(file, lambda rows: rows[0]["files"][0].update(name="img")),
+        "is a file and a folder",
+    ),
     "a dictionary": (
         ONE_TABLE,
         lambda file: pq.write_table(pq.read_table(file), file, use_dictionary=True),
-        "is encoded by a dictionary",
+        "is encoded as",
     ),
 }
 
@@ -353,3 +369,31 @@ def test_nothing_in_a_column_is_refused_in_one_line(column, make_nieh_set, tmp_p
     saved = unpack_set(packed, out, skip_damaged=True)
     assert (saved.n_trajectories, len(saved.damaged)) == (1, 1)
     assert "\n" not in saved.damaged[0]
+
+
+def test_a_name_that_leads_out_and_a_missing_shard_stop_no_other(make_nieh_set, tmp_path):
+    packed = pack(make_nieh_set(size=32))
+    rewrite(
+        packed / "trajectories-00000-of-00001.parquet", lambda rows: rows[0].update(traj_id="..")
+    )
+    (packed / ONE_TABLE).rename(packed / "frames-00000-of-00002.parquet")
+    with pytest.raises(DataError, match="has 1 of 2 files frames-"):
+        NiehSet(packed)
+    out = tmp_path / "saved"
+    out.mkdir()
+    saved = unpack_set(packed, out, skip_damaged=True)
+    assert (saved.n_trajectories, len(saved.damaged)) == (1, 1)
+
+
+def test_many_files_are_several_row_groups(make_nieh_set, monkeypatch):
+    monkeypatch.setattr("infthor_eval.formats.packed.writing._LARGE_PART", 3000)
+    root = make_nieh_set(size=32)
+    for number in range(20):
+        (root / "metadata/traj_a" / f"{number}.bin").write_bytes(bytes(1000))
+    (root / "metadata/traj_b/traj_data.json").write_text("{")
+    packed = pack(root)
+    assert pq.ParquetFile(packed / "files-00000-of-00001.parquet").num_row_groups > 5
+    out = root.with_name("unpacked")
+    out.mkdir()
+    unpack_set(packed, out, skip_damaged=False)
+    assert contents(out) == contents(root)

@@ -105,6 +105,8 @@ def _model(capabilities=Capabilities(), **methods):  # noqa: B008 - it is frozen
         {"counts_tokens": False, "token_ids": False, "deterministic": False},
         {"deterministic": False, "sampling": True},
         {"sampling": True, "choices": True, "max_in_flight": 8, "batch_size": 4},
+        {"image_input": False, "max_in_flight": 8},
+        {"image_input": False, "counts_tokens": False, "token_ids": False},
     ],
 )
 def test_a_good_model_passes(capabilities):
@@ -290,6 +292,18 @@ def test_a_broken_model_is_named(members, clause):
 def test_what_is_no_model_is_named():
     with pytest.raises(ContractError, match=r"object lacks a member of Model: .*tokens_per_frame"):
         check_adapter(object())
+
+
+def test_a_model_that_takes_frames_though_it_claims_not_to_is_named():
+    model = _model(Capabilities(image_input=False), reply=_reply_to_any_parts)
+    with pytest.raises(ContractError, match="a frame does not raise ModelError though image_input"):
+        check_adapter(model)
+
+
+def _reply_to_any_parts(self, decoding):
+    check_decoding("hash", self.capabilities, decoding)
+    check_turns("hash", Capabilities(), self.turns)
+    return self.hash_reply(decoding)
 
 
 def _text_drawn_anew(self, decoding):

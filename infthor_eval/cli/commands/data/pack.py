@@ -37,6 +37,8 @@ def pack(context: click.Context, set_folder: Path, out: Path) -> None:
     data = NiehSet(set_folder)
     if not set_folder.is_dir() or not (data.has_frames and (data.directory / "metadata").is_dir()):
         raise UsageError(f"{set_folder}: has no metadata/ to pack; give a set that is a folder")
+    if out.resolve().is_relative_to(set_folder.resolve()):
+        raise UsageError(f"--out {out}: is within the set; give another place")
     with _new_folder(out) as folder, progress_bar(error_console()) as progress:
         n_trajectories = sum(path.is_dir() for path in data.folder("").iterdir())
         packed = pack_set(
