@@ -53,7 +53,9 @@ _TRAJECTORIES = "trajectories"
 _REPLAYED = "replayed"
 _WHOLE = "whole"
 _SET = "set"
-_TOGETHER = PackSettings(frames_per_group=2_000, level=19)  # all of a trajectory, or base
+_PACKED = PackSettings(level=19)
+# All frames of a base are compressed together: its worlds differ little.
+_PACKED_TWINS = PackSettings(frames_per_group=2_000, level=19)
 
 
 class TrajectoryRecipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -255,7 +257,8 @@ def _pack(manifest: _AnyManifest, work: Path) -> _AnyManifest:
     """Pack a built set, write the manifest with the digests of its parts into it, return that."""
     out = work / _SET
     out.mkdir()
-    pack_set(NiehSet(work / _WHOLE), out, _TOGETHER)
+    settings = _PACKED_TWINS if isinstance(manifest, TwinsManifest) else _PACKED
+    pack_set(NiehSet(work / _WHOLE), out, settings)
     finished = msgspec.structs.replace(manifest, files=digests_of(work / _WHOLE))
     content = msgspec.json.format(msgspec.json.encode(finished), indent=1)
     with write_atomically(out / MANIFEST) as partial:  # it says that all is there

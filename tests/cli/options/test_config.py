@@ -96,7 +96,7 @@ BAD = {
         {"model_args": "a"},
         "typed.yaml: model_args: --model-args: 'a' is not of the form key=value",
     ),
-    "frames": ({"frames": "none"}, "--frames none: give one of shown, blank"),
+    "frames": ({"frames": "nothing"}, "--frames nothing: give one of shown, blank"),
     "no frames": ({"frames": ","}, "--frames is empty; give a name"),
     "unknown model option": (
         {"model": "qwen2.5-vl-tiny", "model_args": {"dtpe": "x"}},
