@@ -23,7 +23,7 @@ from msgspec.structs import replace
 from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
-from infthor_eval.formats.packed.writing import PackSettings, pack_set
+from infthor_eval.formats.packed.writing import CARD, PackSettings, pack_set
 from infthor_eval.formats.qa_csv import write_questions
 from infthor_eval.formats.reading import read_json
 from infthor_eval.formats.shared_frames import store_picture, write_frame_names
@@ -223,7 +223,7 @@ def _building(manifest: Manifest | TwinsManifest, out: Path) -> Iterator[Path]:
     whole = work / _SET
     if (whole / MANIFEST).is_file():  # stopped while the set was moved
         moved = read_json(whole / MANIFEST, _HINT, type(manifest)).files.keys()
-        for name in {*moved, *(path.name for path in out.glob("*.parquet"))}:
+        for name in {*moved, *CARD, *(path.name for path in out.glob("*.parquet"))}:
             remove(out / name)
     elif (out / MANIFEST).is_file():  # stopped after that, or not at all
         remove(work)
