@@ -71,7 +71,12 @@ class HfLm:
     Options: ClassVar[type] = CheckpointOptions
 
     @classmethod
-    def build(cls, name: str, options: CheckpointOptions, seed: int) -> TransformersModel:  # noqa: ARG003
+    def build(
+        cls,
+        name: str,
+        options: CheckpointOptions,
+        seed: int,  # noqa: ARG003
+    ) -> TransformersModel:
         """Load a checkpoint; the seed is not used."""
         loaded = load_checkpoint(cls.locate(name, options), TextFamily)
         model = TransformersModel(name, loaded, options)
