@@ -150,27 +150,18 @@ class ParquetPack:
         """
         entry = self._find(file)
         assert entry is not None
-        content = self._read_kept(entry)
-        if content is None:
+        # Of a set on a server, a frame that was read before is here.
+        kept = self._store.kept(entry.digest) if entry.table == "frames" else None
+        if kept is None:
+            return self._read_entry(entry, file)
+        with wrap_errors(f"{kept}: cannot be kept", writing_hint(", or set XDG_CACHE_HOME")):
+            if kept.is_file() and digest(content := kept.read_bytes()) == entry.digest:
+                return content
             content = self._read_entry(entry, file)
-            self._keep(entry, content)
+            kept.parent.mkdir(parents=True, exist_ok=True)
+            with write_atomically(kept) as partial:
+                partial.write_bytes(content)
         return content
-
-    def _read_kept(self, entry: _Entry) -> bytes | None:
-        """Return the content of a frame of a set on a server that was read before."""
-        kept = self._store.kept(entry.digest) if entry.table == "frames" else None
-        if kept is None or not kept.is_file():
-            return None
-        content = kept.read_bytes()
-        return content if digest(content) == entry.digest else None
-
-    def _keep(self, entry: _Entry, content: bytes) -> None:
-        kept = self._store.kept(entry.digest) if entry.table == "frames" else None
-        if kept is not None:
-            with wrap_errors(f"{kept}: cannot be written", writing_hint(", or set XDG_CACHE_HOME")):
-                kept.parent.mkdir(parents=True, exist_ok=True)
-                with write_atomically(kept) as partial:
-                    partial.write_bytes(content)
 
     def _read_entry(self, entry: _Entry, file: str) -> bytes:
         table = self._tables[entry.table]

@@ -186,7 +186,7 @@ class _Tables:
         self._out = out
         self.settings = settings
         self._files: dict[str, list[Path]] = {}
-        self._open: dict[str, tuple[pq.ParquetWriter, Path]] = {}
+        self._open: dict[str, pq.ParquetWriter] = {}
         self._n_groups: dict[str, int] = {}
 
     def write(self, table: str, rows: Sequence[Mapping[str, Any]]) -> dict[str, int]:
@@ -197,9 +197,9 @@ class _Tables:
         if table not in self._open:
             path = self._out / f".{table}-{len(files):05d}.partial"
             files.append(path)
-            self._open[table] = self._writer(table, path), path
+            self._open[table] = self._writer(table, path)
             self._n_groups[table] = 0
-        writer, _ = self._open[table]
+        writer = self._open[table]
         writer.write_table(pa.Table.from_pylist(list(rows), writer.schema), len(rows))
         self._n_groups[table] += 1
         return {"shard": len(files) - 1, "row_group": self._n_groups[table] - 1}
@@ -213,7 +213,7 @@ class _Tables:
 
     def _close(self, table: str) -> None:
         if table in self._open:
-            self._open.pop(table)[0].close()
+            self._open.pop(table).close()
 
     def _writer(self, table: str, path: Path) -> pq.ParquetWriter:
         # Clue frames of several questions are written once: no reader of ours opens that table.
@@ -271,6 +271,8 @@ class _Group:
         self._data = data
         self._packed = packed
         self._tables = tables
+        roots = (data.folder(""), data.directory)
+        self._inside = [root.resolve() for root in roots if isinstance(root, Path)]
         self._frames: dict[str, dict[int, FrameRef]] = {}
         self._pictures: dict[FrameRef, _Picture] = {}
 
@@ -322,15 +324,14 @@ class _Group:
 
     def _may_be_read(self, path: SetPath) -> bool:
         """Return False for what is no file of the set; links that lead out of it are none."""
-        roots = (self._data.folder(""), self._data.directory)
         problem = file_problem(path)
         if problem is None and not _is_text(path.name):
             problem = "has a name that is no text"
         if problem is None and path.stat().st_size >= _LARGEST_FILE:
             problem = "is too large for a table"
         if problem is None and isinstance(path, Path):
-            inside = [root.resolve() for root in roots if isinstance(root, Path)]
-            if not any(path.resolve().is_relative_to(root) for root in inside):
+            place = path.resolve()
+            if not any(place.is_relative_to(root) for root in self._inside):
                 problem = "is a link that leads out of the set"
         if problem is not None:
             self._packed.left_out[str(path)] = problem
@@ -352,8 +353,9 @@ class _Group:
         return what each trajectory's row says of them."""
         frames = {str(frame.path) for frame in self._pictures}
         listed: dict[str, list[dict[str, Any]]] = {}
-        parts: list[list[dict[str, Any]]] = [[]]  # row groups
-        n_bytes = 0
+        small: list[list[dict[str, Any]]] = [[]]  # row groups
+        large: list[list[dict[str, Any]]] = []
+        n_bytes = 0  # of the last of the small ones
         for name, log in logs.items():
             folder = self._data.folder(name)
             listed[name] = [] if log.content is None else [_listed(LOG, log.content)]
@@ -365,12 +367,15 @@ class _Group:
                 inside = str(path).removeprefix(f"{folder}/")
                 content = path.read_bytes()
                 row = {"traj_id": name, "name": inside, "content": content}
+                if len(content) > _LARGE_FILE:
+                    large.append([row])
+                    continue
                 n_bytes += len(content)
-                if len(content) > _LARGE_FILE or n_bytes > _LARGE_PART:
-                    parts.append([])
+                if n_bytes > _LARGE_PART:
+                    small.append([])
                     n_bytes = len(content)
-                parts[-1].append(row)
-        for part in filter(None, parts):
+                small[-1].append(row)
+        for part in filter(None, (*small, *large)):
             place = self._tables.write("files", part)
             for at, entry in enumerate(part):
                 named = _listed(entry["name"], entry["content"])

@@ -385,6 +385,20 @@ def test_a_name_that_leads_out_and_a_missing_shard_stop_no_other(make_nieh_set, 
     assert (saved.n_trajectories, len(saved.damaged)) == (1, 1)
 
 
+def test_a_large_file_is_a_row_group_by_itself(make_nieh_set):
+    root = make_nieh_set(size=32)
+    for name, n_bytes in (("a.bin", 5_000_000), ("b.bin", 10), ("c.bin", 5_000_000), ("d.bin", 10)):
+        (root / "metadata/traj_a" / name).write_bytes(bytes(n_bytes))
+    table = pq.ParquetFile(pack(root) / "files-00000-of-00001.parquet")
+    sizes = [
+        max(len(row["content"]) for row in table.read_row_group(at).to_pylist())
+        if table.metadata.row_group(at).num_rows > 1
+        else 0
+        for at in range(table.num_row_groups)
+    ]
+    assert max(sizes) < 5_000_000
+
+
 def test_many_files_are_several_row_groups(make_nieh_set, monkeypatch):
     monkeypatch.setattr("infthor_eval.formats.packed.writing._LARGE_PART", 3000)
     root = make_nieh_set(size=32)
