@@ -86,6 +86,12 @@ def _named(
 
 
 _SMALL = {"dtype": "float32", "device": "cpu", "threads": 1}
+_HF_LM = _locate(
+    "hf.families.hf_lm:HfLm",
+    "options.checkpoints:CheckpointOptions",
+    _ANY_TEXT,
+    pretrained="",
+)
 _HF_VLM = _locate("hf.families.hf_vlm:HfVlm", "options.families:HfVlmOptions", _ANY, pretrained="")
 _LLAVA_ONEVISION = _locate(
     "hf.families.llava_onevision:LlavaOnevision",
@@ -120,12 +126,8 @@ BUILT_IN = {
     "gemma3": _named("google/gemma-3-12b-it", "gemma3"),
     "gemma4": _named("google/gemma-4-E4B-it", "gemma4", options="Gemma4Options"),
     "glm-4.6v": _named("zai-org/GLM-4.6V-Flash", "glm4v", "glm4v_moe", "glm46v"),
-    "hf-lm": _locate(
-        "hf.families.hf_lm:HfLm",
-        "options.checkpoints:CheckpointOptions",
-        _ANY_TEXT,
-        pretrained="",
-    ),
+    "hf-lm": _HF_LM,
+    "hf-lm@vllm": _on_vllm("adapter:HfLmOnVllm", "VllmOptions", _HF_LM),
     "hf-vlm": _HF_VLM,
     "hf-vlm@vllm": _on_vllm("adapter:HfVlmOnVllm", "VllmOptions", _HF_VLM),
     "human": _locate("human.adapter:Human", "human.adapter:HumanOptions", _PERSON),

@@ -4,6 +4,7 @@ import functools
 from typing import Any, ClassVar
 
 from model_adapters.hf.adapter import CheckpointAdapter
+from model_adapters.hf.families.hf_lm import HfLm, TextFamily
 from model_adapters.hf.families.hf_vlm import (
     HfVlm,
     ProcessorFamily,
@@ -79,6 +80,18 @@ class HfVlmOnVllm:
         )
 
 
+class HfLmOnVllm:
+    """The adapter `hf-lm@vllm`."""
+
+    Options: ClassVar[type] = VllmOptions
+
+    @classmethod
+    def build(cls, name: str, options: VllmOptions, seed: int) -> VllmModel:  # noqa: ARG003
+        """Start vLLM with a language model; the seed is not used."""
+        import_vllm(name)
+        return _start(name, HfLm.locate(name, options), TextFamily)
+
+
 def _start(
     name: str, located: LocatedCheckpoint[Any], family: MakeFamily, processor: Any = None
 ) -> VllmModel:
@@ -92,9 +105,11 @@ def _start(
     if runs_on_cpu():
         check_kernels(name, located.config)
     max_tokens = token_limit(options.pretrained, loaded.max_tokens, options)
-    with wrap_model_errors(name):
-        per_frame = len(loaded.family.frame_ids((options.frame_size, options.frame_size)))
-    max_frames = frame_limit(max_tokens, per_frame, options)
+    max_frames = 0
+    if located.has_vision:
+        with wrap_model_errors(name):
+            per_frame = len(loaded.family.frame_ids((options.frame_size, options.frame_size)))
+        max_frames = frame_limit(max_tokens, per_frame, options)
     arguments = model_arguments(
         located.folder, located.config, options, max_tokens=max_tokens, max_frames=max_frames
     )

@@ -50,14 +50,15 @@ def model_arguments(
 ) -> dict[str, Any]:
     """Return the arguments of a model that answers in conversations.
 
-    A context extension is in the config already. `max_tokens` limits context and reply together.
+    A context extension is in the config already. `max_tokens` limits context and reply together;
+    `max_frames` is 0 for a model that reads text alone.
     """
-    frames = {"count": max_frames, "width": options.frame_size, "height": options.frame_size}
     arguments = engine_arguments(folder, options) | {
         "max_model_len": max_tokens,
         "trust_remote_code": options.trust_remote_code,
-        "limit_mm_per_prompt": {"image": frames, "video": _NO_VIDEO},
     }
+    if max_frames:
+        arguments |= _frame_arguments(options, max_frames)
     if options.encoder_cache_tokens is not None:
         arguments["ec_manager_config"] = encoder_cache_of(options.encoder_cache_tokens)
     if options.rope is not None:
@@ -65,11 +66,18 @@ def model_arguments(
     tuning = getattr(config.get_text_config(), _TUNING, None)
     if tuning is not None:
         arguments["override_generation_config"] = {_TUNING: bool(tuning)}
-    arguments["mm_processor_kwargs"] = {
-        "use_fast": options.image_backend == "torchvision",
-        **options.image_settings(),
-    }
     return arguments
+
+
+def _frame_arguments(options: VllmOptions, max_frames: int) -> dict[str, Any]:
+    frames = {"count": max_frames, "width": options.frame_size, "height": options.frame_size}
+    return {
+        "limit_mm_per_prompt": {"image": frames, "video": _NO_VIDEO},
+        "mm_processor_kwargs": {
+            "use_fast": options.image_backend == "torchvision",
+            **options.image_settings(),
+        },
+    }
 
 
 def token_limit(pretrained: str, limit: int | None, options: VllmOptions) -> int:

@@ -61,6 +61,7 @@ class VllmModel(CheckpointModel):
             deterministic=False,
             sampling=True,
             choices=True,
+            image_input=self._prompter.takes_frames,
             batch_size=_BATCH,
             batch_contexts=True,
             max_tokens=self._max_tokens,

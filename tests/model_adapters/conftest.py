@@ -16,6 +16,7 @@ from infthor_eval.formats.frames import FrameRef
 from model_adapters import Video, load
 
 from .checkpoints import FAMILIES, OTHERS, save, save_family
+from .language_models import SETTINGS, save_language_model
 
 PEERS = Path(sys.prefix) / "test-peers"  # torchvision's Python half, kept out of the environment
 
@@ -133,6 +134,15 @@ def checkpoints(tmp_path_factory):
     for name in (*FAMILIES, *OTHERS):
         save(name, root / name)
     return {name: root / name for name in (*FAMILIES, *OTHERS)}
+
+
+@pytest.fixture(scope="session")
+def language_models(tmp_path_factory):
+    """A folder of tiny language models by their model type."""
+    root = tmp_path_factory.mktemp("language_models")
+    for model_type, settings in SETTINGS.items():
+        save_language_model(root / model_type, model_type, **settings)
+    return root
 
 
 @pytest.fixture(scope="session")

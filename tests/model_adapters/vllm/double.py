@@ -21,6 +21,7 @@ import torch
 from PIL import Image
 from transformers import StoppingCriteriaList
 
+from model_adapters.hf.families.hf_lm import HfLm, TextFamily
 from model_adapters.hf.families.hf_vlm import ProcessorFamily, family_of
 from model_adapters.hf.loading.checkpoint import load_checkpoint, locate
 from model_adapters.hf.loading.processors import load_processor
@@ -82,13 +83,16 @@ class _Vlm:
 
     def __init__(self, arguments: Mapping[str, Any]) -> None:
         dtype = arguments.get("dtype", "auto")
-        located = locate(
-            CheckpointOptions(pretrained=arguments["model"], dtype=dtype, device="cpu")
-        )
+        options = CheckpointOptions(pretrained=arguments["model"], dtype=dtype, device="cpu")
+        is_text = "limit_mm_per_prompt" not in arguments
+        located = HfLm.locate("hf-lm", options) if is_text else locate(options)
         for part, changed in arguments.get("hf_overrides", {}).items():
+            if is_text:
+                setattr(located.config, part, changed)
+                continue
             for name, value in changed.items():
                 setattr(getattr(located.config, part), name, _as_read(name, value))
-        family = family_of(located.config)
+        family = TextFamily if is_text else family_of(located.config)
         if family is None:
             family = functools.partial(ProcessorFamily, processor=load_processor(located))
         self._loaded = load_checkpoint(located, family)
@@ -305,7 +309,7 @@ class _LLM:
             raise double.fails
         kind = json.loads((Path(model) / "config.json").read_text())["model_type"]
         self._model: _Vlm | _OpenVLA = _OpenVLA(arguments) if kind == "openvla" else _Vlm(arguments)
-        self._most_frames = _count(arguments["limit_mm_per_prompt"]["image"])
+        self._most_frames = _count(arguments.get("limit_mm_per_prompt", {}).get("image", 0))
         self._limit = arguments.get("max_model_len", self._model.limit)
         self._caches = arguments.get("enable_prefix_caching", True)
         self._seen: list[list[tuple[int, str]]] = []

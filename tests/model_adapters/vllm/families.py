@@ -4,9 +4,11 @@ from typing import Any
 
 from model_adapters import Reply
 
-__all__ = ["FAMILIES", "adapter_of", "facts"]
+__all__ = ["FAMILIES", "TEXTS", "adapter_of", "facts"]
 
 FAMILIES = ("qwen2.5-vl", "llava-onevision", "pixtral", "llava", "idefics3")
+
+TEXTS = ("What do you see?", "RotateLeft. OpenObject Fridge. " * 20 + "\nWhat is open?")
 
 
 def adapter_of(family: str) -> str:

@@ -15,8 +15,8 @@ from infthor_eval.formats.frames import FrameRef
 from model_adapters import Decoding, check_adapter, load
 from model_adapters.vllm.engine import import_vllm
 
-from ..asking import up_to, user
-from .families import FAMILIES, adapter_of, facts
+from ..asking import load_saved, load_with, talk_of, up_to, user
+from .families import FAMILIES, TEXTS, adapter_of, facts
 
 
 @pytest.mark.parametrize("family", ["qwen2.5-vl", "pixtral", "llava"])
@@ -44,6 +44,19 @@ def test_replies_and_counts_are_those_of_transformers(family, start, in_process,
         assert facts(replies[0]) == facts(replies[1])
         assert replies[0].n_context_tokens == talks[0].n_tokens
         assert replies[0].context_hash == replies[1].context_hash
+
+
+@pytest.mark.parametrize("options", [{}, {"rope": "yarn:2"}])
+def test_language_models_read_texts_alone(options, vllm, language_models, frames):
+    ours = load_with("hf-lm@vllm", pretrained=language_models / "llama", dtype="float32", **options)
+    theirs = load_saved("hf-lm", language_models / "llama", **options)
+    for text in TEXTS:
+        replies = [model.answer(user(text), up_to(8)) for model in (ours, theirs)]
+        assert facts(replies[0]) == facts(replies[1])
+    assert not ours.capabilities.image_input
+    assert not {"limit_mm_per_prompt", "mm_processor_kwargs"} & set(vllm.started[0])
+    with pytest.raises(ModelError, match="hf-lm@vllm reads text alone"):
+        talk_of(ours, user(frames[0])).reply(up_to(2))
 
 
 @pytest.mark.parametrize(

@@ -174,7 +174,7 @@ def test_without_a_switch_there_is_nothing_to_compare(run_cli, model, expected):
 
 
 def test_engines_that_do_not_run_a_model_are_refused_in_one_line(run_cli, tmp_path):
-    known = "these do: hf-vlm, llava-onevision, openvla, pixtral, qwen2.5-vl"
+    known = "these do: hf-lm, hf-vlm, llava-onevision, openvla, pixtral, qwen2.5-vl"
     for command in ("run", "plan"):
         code, _, err = run_cli(
             command, "--model", "deepseek-vl", "--engine", "vllm", "--tasks", "nieh_mini"

@@ -1,5 +1,4 @@
-"""hf-lm on tiny language models with random weights, as transformers' `save_pretrained` writes
-them."""
+"""hf-lm on tiny language models."""
 
 import json
 import shutil
@@ -7,74 +6,20 @@ from functools import partial
 
 import pytest
 import torch
-from transformers import (
-    AutoConfig,
-    AutoModelForCausalLM,
-    AutoTokenizer,
-    CLIPConfig,
-    GenerationConfig,
-)
+from transformers import AutoModelForCausalLM, AutoTokenizer, CLIPConfig
 
 from infthor_eval.errors import ModelError, UsageError
 from model_adapters import Video, check_adapter, load
 from model_adapters.hf.prompting.prompt import token_ids
-from model_adapters.tiny.tokenizer import train_tokenizer
-from model_adapters.tiny.twin import HEAD, text_config
 
 from ....helpers.refusals import read_one_line
 from ...asking import ask, load_saved, talk_of, up_to, user
+from ...language_models import SETTINGS, TEMPLATE, save_language_model
 
-# In the form of published language models: contents are strings.
-TEMPLATE = """\
-{%- for message in messages -%}
-{{- '<|im_start|>' + message['content'] + '<|im_end|>' -}}
-{%- endfor -%}
-{%- if add_generation_prompt %}{{ '<|im_start|>' }}{% endif -%}
-"""
-SPECIAL = ("<s>", "<|im_start|>", "<|im_end|>", "<pad>")
-# The second one's layers attend to windows, the third caps the scores, the fourth and the fifth
-# have positions of other kinds, the last one's layers have states instead of keys.
-SETTINGS = {
-    "llama": {"head_dim": HEAD},
-    "qwen2": {"use_sliding_window": True, "sliding_window": 12, "max_window_layers": 1},
-    "gemma2": {"head_dim": HEAD, "attn_logit_softcapping": 0.1, "sliding_window": 12},
-    "gpt_neox": {},
-    "gpt2": {"n_layer": 2, "n_head": 4, "n_embd": 128, "n_positions": 2048},
-    "qwen3_5_text": {
-        "head_dim": HEAD,
-        "layer_types": ["linear_attention", "full_attention"],
-        **{f"linear_num_{what}_heads": 2 for what in ("key", "value")},
-        **{f"linear_{what}_head_dim": 16 for what in ("key", "value")},
-    },
-}
 LOG = "PickupObject Mug. MoveAhead. OpenObject Fridge. " * 6
 QUESTIONS = ("\nWhere is the mug?", "\nWhat did you open?")
 
 _load = partial(load_saved, "hf-lm")
-
-
-def _save(folder, model_type, **settings):
-    tokenizer = train_tokenizer(SPECIAL, end="<|im_end|>", pad="<pad>", begin="<s>", named={})
-    tokenizer.chat_template = TEMPLATE
-    tokenizer.save_pretrained(folder)
-    end, pad, begin = map(tokenizer.convert_tokens_to_ids, ("<|im_end|>", "<pad>", "<s>"))
-    text = {"bos_token_id": begin, "max_position_embeddings": 2048, **settings}
-    if model_type == "gpt2":
-        text |= {"vocab_size": len(tokenizer), "initializer_range": 0.2, "eos_token_id": end}
-    else:
-        text = text_config(len(tokenizer), end, pad, **text)
-    torch.manual_seed(0)
-    model = AutoModelForCausalLM.from_config(AutoConfig.for_model(model_type, **text))
-    model.generation_config = GenerationConfig(eos_token_id=[end], pad_token_id=pad)
-    model.save_pretrained(folder)
-
-
-@pytest.fixture(scope="module")
-def saved(tmp_path_factory):
-    root = tmp_path_factory.mktemp("language_models")
-    for model_type, settings in SETTINGS.items():
-        _save(root / model_type, model_type, **settings)
-    return root
 
 
 def _generate(folder, text, new):
@@ -94,14 +39,14 @@ def _generate(folder, text, new):
 
 
 @pytest.mark.parametrize("model_type", SETTINGS)
-def test_replies_are_those_of_generate_and_share_a_prefix(model_type, saved):
-    model = _load(saved / model_type, chunk_tokens=40)
+def test_replies_are_those_of_generate_and_share_a_prefix(model_type, language_models):
+    model = _load(language_models / model_type, chunk_tokens=40)
     talk = talk_of(model, user(LOG))
     alone = []
     for question in QUESTIONS:
         start = talk.mark()
         talk.append(question)
-        ids, expected = _generate(saved / model_type, LOG + question, 8)
+        ids, expected = _generate(language_models / model_type, LOG + question, 8)
         assert list(token_ids(model.pieces(talk.turns))) == ids
         reply = talk.reply(up_to(8))
         assert reply.token_ids == expected
@@ -120,8 +65,8 @@ def test_replies_are_those_of_generate_and_share_a_prefix(model_type, saved):
 
 
 @pytest.mark.parametrize("model_type", ["llama", "qwen2"])
-def test_a_model_without_vision_keeps_the_contract(model_type, saved):
-    model = _load(saved / model_type)
+def test_a_model_without_vision_keeps_the_contract(model_type, language_models):
+    model = _load(language_models / model_type)
     assert model.capabilities.batch_size > 1
     assert not model.capabilities.image_input
     check_adapter(model)
@@ -129,16 +74,16 @@ def test_a_model_without_vision_keeps_the_contract(model_type, saved):
     assert model.identity()["class"].endswith("ForCausalLM")
 
 
-def test_texts_with_nothing_in_common_are_answered_together(saved):
-    model = _load(saved / "llama", prompt="plain")
+def test_texts_with_nothing_in_common_are_answered_together(language_models):
+    model = _load(language_models / "llama", prompt="plain")
     talk = model.conversation()
     asked = [["RotateLeft then?"], ["What is it?"]]
     together = talk.replies(asked, up_to(4))
     assert [one.token_ids for one in together] == [ask(model, *it).token_ids for it in asked]
 
 
-def test_turns_of_every_role_are_read(saved):
-    model = _load(saved / "llama")
+def test_turns_of_every_role_are_read(language_models):
+    model = _load(language_models / "llama")
     talk = model.conversation()
     for role, text in (
         ("system", "Be brief."),
@@ -153,15 +98,15 @@ def test_turns_of_every_role_are_read(saved):
     assert written == f"<s>{said}<|im_start|>"
 
 
-def test_a_reply_that_begins_in_thought_is_known(saved, tmp_path):
-    folder = shutil.copytree(saved / "llama", tmp_path / "thinker")
+def test_a_reply_that_begins_in_thought_is_known(language_models, tmp_path):
+    folder = shutil.copytree(language_models / "llama", tmp_path / "thinker")
     template = TEMPLATE.replace("'<|im_start|>' }}{% endif", "'<|im_start|><think>\\n' }}{% endif")
     (folder / "chat_template.jinja").write_text(template)
     assert _load(folder)._loaded.opening == "<think>"
 
 
-def test_frames_are_refused_before_anything_is_computed(saved, frames, monkeypatch):
-    model = _load(saved / "llama")
+def test_frames_are_refused_before_anything_is_computed(language_models, frames, monkeypatch):
+    model = _load(language_models / "llama")
     monkeypatch.setattr(model, "pieces", None)
     for shown in (frames[0], Video((frames[0],), 1.0)):
         talk = talk_of(model, user("Look: ", shown, "?"))
@@ -175,8 +120,8 @@ def test_frames_are_refused_before_anything_is_computed(saved, frames, monkeypat
         model.tokens_per_frame(frames[0])
 
 
-def test_prompts_beyond_the_limit_are_refused(saved):
-    model = _load(saved / "llama")
+def test_prompts_beyond_the_limit_are_refused(language_models):
+    model = _load(language_models / "llama")
     with pytest.raises(ModelError, match="beyond the 2048 tokens of hf-lm"):
         ask(model, LOG * 40)
 
@@ -197,7 +142,7 @@ def test_a_checkpoint_with_vision_is_refused(checkpoints):
 
 
 def test_a_model_that_sees_later_tokens_is_refused(tmp_path):
-    _save(tmp_path, "bert")
+    save_language_model(tmp_path, "bert")
     with pytest.raises(ModelError, match="bert") as raised:
         _load(tmp_path)
     read_one_line(raised)
@@ -208,8 +153,8 @@ def test_no_checkpoint_is_a_usage_error():
         load("hf-lm", {}, seed=0)
 
 
-def test_a_model_without_a_chat_template_is_read_plainly(saved, tmp_path):
-    folder = shutil.copytree(saved / "gpt_neox", tmp_path / "base")
+def test_a_model_without_a_chat_template_is_read_plainly(language_models, tmp_path):
+    folder = shutil.copytree(language_models / "gpt_neox", tmp_path / "base")
     (folder / "chat_template.jinja").unlink()
     assert "chat_template" not in json.loads((folder / "tokenizer_config.json").read_text())
     with pytest.raises(ModelError, match="has no chat template; add"):

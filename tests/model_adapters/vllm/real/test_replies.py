@@ -5,8 +5,8 @@ import pytest
 
 from model_adapters import check_adapter
 
-from ...asking import up_to, user
-from ..families import FAMILIES, adapter_of, facts
+from ...asking import load_saved, up_to, user
+from ..families import FAMILIES, TEXTS, adapter_of, facts
 
 
 def _prompts(frames):
@@ -26,6 +26,15 @@ def test_replies_are_those_of_transformers(family, cached, start, in_process, fr
     theirs = in_process(family, adapter_of(family))
     for parts in _prompts(frames):
         replies = [model.answer(user(*parts), up_to(50)) for model in (ours, theirs)]
+        assert facts(replies[0]) == facts(replies[1])
+
+
+@pytest.mark.parametrize("model_type", ["llama", "gemma2", "gpt2"])
+def test_language_models_reply_as_in_transformers(model_type, start, language_models):
+    folder = language_models / model_type
+    ours, theirs = start(name="hf-lm", pretrained=folder), load_saved("hf-lm", folder)
+    for text in TEXTS:
+        replies = [model.answer(user(text), up_to(50)) for model in (ours, theirs)]
         assert facts(replies[0]) == facts(replies[1])
 
 
