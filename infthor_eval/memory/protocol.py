@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
 from infthor_eval.formats.frames import FrameRef
-from infthor_eval.formats.step_log import ObjectLog
+from infthor_eval.formats.step_log import ObjectLog, Step
 
 # Tokens of a recalled text are estimated, as no tokenizer is at hand for a model behind a server;
 # the tables have the tokens that the model itself counted.
@@ -70,6 +70,8 @@ class Observation:
             and if not known.
         goal: the goal that the agent is at; None if it is not known.
         log: the simulator's metadata of the step; None unless the memory is privileged.
+        step: the whole entry of the step in the trajectory's log, with instances; likewise, and
+            None where an agent acts.
     """
 
     number: int
@@ -77,6 +79,7 @@ class Observation:
     action: str | None = None
     goal: str | None = None
     log: ObjectLog | None = None
+    step: Step | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,9 +1,10 @@
 """Memories that recall texts: an exact observer's log, and the model's own notes."""
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, ClassVar
 
-from infthor_eval.formats.step_log import ObjectLog
+from infthor_eval.formats.step_log import ObjectLog, ObjectState, Step
 from infthor_eval.memory.protocol import (
     CHARACTERS_PER_TOKEN,
     MemoryCapabilities,
@@ -40,8 +41,9 @@ class _Texts:
 class TextLog(_Texts):
     """An exact observer's log: each goal and action, and objects seen, from the metadata.
 
-    A line says what is new: the types that come into view, what is open, in the hand, and in or on
-    what is seen. Of a log beyond the budget the last lines are recalled.
+    A line says what is new: each object that is seen first, or seen changed, with what it is in or
+    on and its state. Published logs have types alone: those that come into view, what is open, in
+    the hand, and in or on what is seen. Of a log beyond the budget the last lines are recalled.
     """
 
     capabilities: ClassVar[MemoryCapabilities] = MemoryCapabilities(privileged=True)
@@ -120,15 +122,74 @@ def _lines(steps: Sequence[Observation]) -> Iterator[str]:
     """Yield a line for each step that tells anything new."""
     goal = None
     before = ObjectLog()
+    observer = _Observer()
     for step in steps:
         sentences = [f"goal: {step.goal}"] if step.goal != goal and step.goal else []
-        sentences += [step.action] if step.action else []
-        log = step.log or ObjectLog()
-        sentences += _news(before, log)
+        if step.step is not None and step.step.seen is not None:
+            sentences += observer.news(step.step)
+        else:
+            log = step.log or ObjectLog()
+            sentences += [*([step.action] if step.action else []), *_news(before, log)]
+            before = log
         if sentences:
             yield f"Step {step.number}: {'; '.join(sentences)}.\n"
         goal = step.goal
-        before = log
+
+
+class _Observer:
+    """Tells objects apart, and knows what it has told of each: "Mug 2 at CounterTop 1"."""
+
+    def __init__(self) -> None:
+        self._states: dict[str, ObjectState] = {}
+        self._names: dict[str, str] = {}
+        self._n_named: Counter[str] = Counter()
+        self._told: dict[str, str] = {}
+
+    def news(self, step: Step) -> list[str]:
+        """Return the action with its objects, and each object that is seen first, or seen changed,
+        or that is no more."""
+        self._states |= step.changes
+        news = [self._action(step)] if step.action else []
+        gone = [key for key in self._told if not self._states[key].exists]
+        news += [f"{self._name(key)} is gone" for key in gone]
+        for key in gone:
+            del self._told[key]
+        seen = {key: self._describe(key) for key in step.seen or () if key in self._states}
+        new = {key: text for key, text in seen.items() if text != self._told.get(key)}
+        self._told |= new
+        for verb, held in (("sees", False), ("holds", True)):
+            objects = [text for key, text in new.items() if self._states[key].held == held]
+            news += [f"{verb} {', '.join(objects)}"] if objects else []
+        return news
+
+    def _action(self, step: Step) -> str:
+        objects = [key for key in (step.target, step.receptacle) if key in self._states]
+        verb, *words = (step.action or "").split()
+        named = " ".join([verb, *(map(self._name, objects) if objects else words)])
+        return named if step.success else f"{named} (refused)"
+
+    def _describe(self, key: str) -> str:
+        state = self._states[key]
+        place = f" at {self._name(state.parents[0])}" if state.parents else ""
+        flags = {
+            "open": state.is_open,
+            "closed": state.is_open is False,
+            "on": state.is_on,
+            "off": state.is_on is False,
+            "sliced": state.is_sliced,
+            "dirty": state.is_dirty,
+            "cooked": state.is_cooked,
+            state.temperature.lower(): state.temperature != "RoomTemp",
+        }
+        told = ", ".join(flag for flag, holds in flags.items() if holds)
+        return f"{self._name(key)}{place}{f' ({told})' if told else ''}"
+
+    def _name(self, key: str) -> str:
+        if key not in self._names:
+            kind = self._states[key].type if key in self._states else key.split("|", maxsplit=1)[0]
+            self._n_named[kind] += 1
+            self._names[key] = f"{kind} {self._n_named[kind]}"
+        return self._names[key]
 
 
 def _news(before: ObjectLog, now: ObjectLog) -> list[str]:

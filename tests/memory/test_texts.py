@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from infthor_eval.formats.step_log import ObjectLog
+from infthor_eval.formats.step_log import ObjectInFrame, ObjectLog, ObjectState, Step
 from infthor_eval.memory import tokens_of
 from infthor_eval.memory.texts import Notes, TextLog
 
@@ -27,6 +27,49 @@ def test_the_log_says_what_is_new_at_each_step(observed):
         "Step 2: Action2.",
         "Step 3: goal: Cook an egg; Action3; sees Fridge; open: Fridge; holds Mug.",
         "Step 4: Action4; holds nothing.",
+    ]
+
+
+SEEN = ObjectInFrame(pixels=90, box=(0, 0, 9, 9))
+FRIDGE, BREAD, CUP = "Fridge|1|1|1", "Bread|1|1|2", "Cup|1|1|3"
+OTHER = "Cup|2|2|2"
+SHUT = ObjectState("Fridge", is_open=False)
+IN_FRIDGE = ObjectState("Cup", parents=(FRIDGE,), temperature="Cold", is_dirty=True)
+
+
+def _step(number, action, seen, changes, *objects, **more):
+    target, receptacle = [*objects, None, None][:2]
+    return Step(
+        number,
+        f"{number}.png",
+        action=action,
+        seen=dict.fromkeys(seen, SEEN),
+        changes=changes,
+        target=target,
+        receptacle=receptacle,
+        **more,
+    )
+
+
+def test_a_log_with_instances_tells_them_apart_as_they_are_seen(observed):
+    everything = {FRIDGE: SHUT, BREAD: ObjectState("Bread"), CUP: IN_FRIDGE, OTHER: IN_FRIDGE}
+    held = ObjectState("Cup", held=True)
+    steps = [
+        _step(0, None, [FRIDGE, BREAD], everything),
+        _step(1, "OpenObject Fridge", [FRIDGE], {}, FRIDGE, success=False),
+        _step(2, "SliceObject Bread", [FRIDGE], {BREAD: ObjectState("Bread", exists=False)}, BREAD),
+        # What happens out of sight is not told before it is seen.
+        _step(3, "LookUp", [], {FRIDGE: ObjectState("Fridge", is_open=True), CUP: held}),
+        _step(4, "PutObject Cup Fridge", [FRIDGE, OTHER, CUP], {CUP: IN_FRIDGE}, CUP, FRIDGE),
+    ]
+    (text,) = observed(TextLog(), 4, steps=steps)()
+    assert text.splitlines() == [
+        "Step 0: goal: Wash a mug; sees Fridge 1 (closed), Bread 1.",
+        "Step 1: OpenObject Fridge 1 (refused).",
+        "Step 2: SliceObject Bread 1; Bread 1 is gone.",
+        "Step 3: goal: Cook an egg; LookUp.",
+        "Step 4: PutObject Cup 1 Fridge 1; sees Fridge 1 (open), Cup 2 at Fridge 1 (dirty, cold), "
+        "Cup 1 at Fridge 1 (dirty, cold).",
     ]
 
 

@@ -262,7 +262,7 @@ def _visible(steps: Sequence[Observation], memory: Memory) -> list[Observation]:
     return (
         list(steps)
         if memory.capabilities.privileged
-        else [replace(step, log=None) for step in steps]
+        else [replace(step, log=None, step=None) for step in steps]
     )
 
 
@@ -284,6 +284,7 @@ def _observations(task_samples: TaskSamples, sample: QuestionVariant) -> list[Ob
             or (actions[step.step] if number and step.step < len(actions) else None),
             goal=goals.get(step.step),
             log=step.object_log,
+            step=step,
         )
         for number, (frame, step) in enumerate(zip(frames, steps, strict=True))
     ]
