@@ -13,6 +13,7 @@ from infthor_eval.formats.question import Question
 from infthor_eval.formats.step_log import read_steps
 from tests.helpers.command_line import option_words, read_success
 from tests.helpers.hub import COMMIT, serve_hub, use_hub
+from tests.model_adapters.language_models import SETTINGS, save_language_model
 
 NAME = "me/my_set"
 N_TRAJECTORIES = 40
@@ -40,16 +41,23 @@ def hub(folder, tmp_path, monkeypatch):
         yield answers
 
 
+SEEING = ("qwen2.5-vl-tiny", "llava-onevision-tiny", "pixtral-tiny", "deepseek-vl-tiny")
+READING = ("llama", "gpt2")
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "model", ["qwen2.5-vl-tiny", "llava-onevision-tiny", "pixtral-tiny", "deepseek-vl-tiny"]
-)
+@pytest.mark.parametrize("model", [*SEEING, *READING])
 def test_replies_of_a_run_are_those_of_the_folder(model, hub, run_cli, tmp_path):
     """Of a run by the address, on an empty cache, against one on a folder."""
+    asked = {"model": model, "tasks": "nieh_gt"}
+    if model in READING:
+        save_language_model(tmp_path / model, model, **SETTINGS[model])
+        asked = {"model": f"hf-lm:pretrained={tmp_path / model}", "tasks": "nieh_memory"}
+        asked |= {"memory": "text-log", "frames": "none"}
     replies = []
     for place in ("hf://me/my_set", tmp_path / "set"):
         out = tmp_path / f"out-{len(replies)}"
-        words = option_words(model=model, tasks="nieh_gt", data=place, limit=4, out=out)
+        words = option_words(**asked, data=place, limit=4, out=out)
         read_success(run_cli(*words))
         (file,) = out.rglob("samples_*.jsonl")
         replies.append([json.loads(line)["resps"] for line in file.read_text().splitlines()])
