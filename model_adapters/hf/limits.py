@@ -22,7 +22,8 @@ def check_limit(
     if limit is not None and n_context + max_new_tokens > limit:
         raise ModelError(
             f"a context of {n_context} tokens and {max_new_tokens} new ones is beyond the {limit} "
-            f"tokens of {name}; use fewer frames, or set {option} if the model can take more"
+            f"tokens of {name}; use fewer frames or less text, or set {option} if the model can "
+            "take more"
         )
 
 

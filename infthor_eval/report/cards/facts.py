@@ -9,8 +9,9 @@ from pathlib import Path
 from statistics import fmean
 from typing import Any
 
-from infthor_eval.errors import DataError, wrap_errors
+from infthor_eval.errors import DataError, UsageError, wrap_errors
 from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.own_folder import OWN_FRAMES
 from infthor_eval.formats.reading import read_json
 from infthor_eval.formats.set_info import frames_of, writer_of
 from infthor_eval.formats.twins import TwinPair
@@ -139,8 +140,18 @@ class SetFacts:
 
 
 def read_facts(root: Path) -> SetFacts:
-    """Count what is in a set."""
+    """Count what is in a set.
+
+    Raises:
+        UsageError: its frames are of no simulator, of which a card's texts would say nothing true.
+        DataError: the set cannot be read, or no question of it can be asked.
+    """
     data = NiehSet(root)
+    if data.simulator == OWN_FRAMES:
+        raise UsageError(
+            f"{root}: has frames of your own, and a card speaks of simulated homes; write its "
+            "README.md yourself"
+        )
     if not data.questions:
         raise DataError(f"{root}: no question can be asked; fix the set, or give another")
     folder = data.directory

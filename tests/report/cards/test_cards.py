@@ -84,6 +84,11 @@ def test_it_needs_a_set_a_licence_and_a_day(make_nieh_set, tmp_path, run_cli):
         run_cli("card", data, "--licence", "MIT", "--day", "2026-02-30"),
         "is no day; write YYYY-MM-DD",
     )
+    assert run_cli("init-set", tmp_path / "mine")[0] == 0
+    assert_refused(
+        run_cli("card", tmp_path / "mine", "--licence", "MIT"),
+        "has frames of your own, and a card speaks of simulated homes",
+    )
 
 
 @pytest.mark.parametrize(
