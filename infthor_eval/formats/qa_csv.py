@@ -24,6 +24,7 @@ from typing import Any
 from infthor_eval.errors import DataError
 from infthor_eval.formats.csv_files import CsvRow, read_rows, shield, unshield
 from infthor_eval.formats.question import PublishedColumns, Question, SkippedQuestion
+from infthor_eval.formats.reading import is_encodable
 from infthor_eval.storage.files import write_atomically
 
 _COLUMNS = ("traj_id", "question", "gt_img_idx", "answer")
@@ -181,5 +182,4 @@ def _is_answerable(answer: str | int | float) -> bool:
     """Return True for a text that is not blank, or a number that JSON can hold."""
     if not isinstance(answer, str):
         return math.isfinite(answer) and abs(answer) < _LARGEST
-    # Lone surrogates cannot be encoded, so no file of results could hold them.
-    return bool(answer.strip()) and not any("\ud800" <= letter <= "\udfff" for letter in answer)
+    return bool(answer.strip()) and is_encodable(answer)

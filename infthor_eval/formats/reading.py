@@ -145,3 +145,8 @@ def json_lines_of(path: Path, hint: str) -> Iterator[dict[str, Any]]:
 def first_duplicate(values: Iterable[T]) -> T | None:
     """Return the first value that is there more than once, None if there is none."""
     return next((value for value, n in Counter(values).items() if n > 1), None)
+
+
+def is_encodable(text: str) -> bool:
+    """Return False for a text with lone surrogates, which no file of ours can hold."""
+    return not any("\ud800" <= letter <= "\udfff" for letter in text)

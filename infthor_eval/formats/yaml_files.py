@@ -6,7 +6,7 @@ from typing import Any
 import yaml
 
 from infthor_eval.errors import DataError, wrap_errors
-from infthor_eval.formats.reading import first_duplicate, read_text
+from infthor_eval.formats.reading import first_duplicate, is_encodable, read_text
 from infthor_eval.storage.limits import ALIAS_NODES
 
 
@@ -54,9 +54,7 @@ def _check(root: yaml.Node, path: Path) -> None:
 
 
 def _children(node: yaml.Node, path: Path) -> list[yaml.Node]:
-    if isinstance(node, yaml.ScalarNode) and any(
-        "\ud800" <= letter <= "\udfff" for letter in node.value
-    ):
+    if isinstance(node, yaml.ScalarNode) and not is_encodable(node.value):
         raise DataError(
             f"{path}: half of a character (\\ud800 to \\udfff) in a text; write it whole, or take "
             "it out"

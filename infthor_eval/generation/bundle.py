@@ -23,7 +23,8 @@ from msgspec.structs import replace
 from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
-from infthor_eval.formats.packed.writing import CARD, PackSettings, pack_set
+from infthor_eval.formats.packed.table_writer import PackSettings
+from infthor_eval.formats.packed.writing import CARD, pack_set
 from infthor_eval.formats.qa_csv import write_questions
 from infthor_eval.formats.reading import read_json
 from infthor_eval.formats.shared_frames import store_picture, write_frame_names

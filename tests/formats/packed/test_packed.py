@@ -13,7 +13,8 @@ from PIL import Image
 
 from infthor_eval.errors import DataError
 from infthor_eval.formats.nieh_set import NiehSet
-from infthor_eval.formats.packed.writing import CARD, PackSettings, pack_set, unpack_set
+from infthor_eval.formats.packed.table_writer import PackSettings
+from infthor_eval.formats.packed.writing import CARD, pack_set, unpack_set
 from infthor_eval.formats.step_log import read_steps, write_steps
 from tests.helpers.twin_sets import write_twin_set
 
@@ -129,7 +130,7 @@ def test_pictures_that_are_nearly_equal_take_little(tmp_path):
 
 
 def test_shards_are_of_limited_size(make_nieh_set, monkeypatch):
-    monkeypatch.setattr("infthor_eval.formats.packed.writing._SHARD_BYTES", 1)
+    monkeypatch.setattr("infthor_eval.formats.packed.table_writer._SHARD_BYTES", 1)
     root = make_nieh_set(size=32)
     packed = pack(root, frames_per_group=2)
     assert len(list(packed.glob("frames-*-of-00006.parquet"))) == 6
@@ -400,7 +401,7 @@ def test_a_large_file_is_a_row_group_by_itself(make_nieh_set):
 
 
 def test_many_files_are_several_row_groups(make_nieh_set, monkeypatch):
-    monkeypatch.setattr("infthor_eval.formats.packed.writing._LARGE_PART", 3000)
+    monkeypatch.setattr("infthor_eval.formats.packed.groups._LARGE_PART", 3000)
     root = make_nieh_set(size=32)
     for number in range(20):
         (root / "metadata/traj_a" / f"{number}.bin").write_bytes(bytes(1000))

@@ -14,7 +14,7 @@ from infthor_eval.cli.options.values import PATH, SET
 from infthor_eval.errors import UsageError
 
 if TYPE_CHECKING:
-    from infthor_eval.formats.packed.writing import Packed
+    from infthor_eval.formats.packed.groups import Packed
 
 _out = click.option("--out", required=True, type=PATH, help="Folder of the new set, new or empty.")
 
