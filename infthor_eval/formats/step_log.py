@@ -10,6 +10,7 @@ Frame 0 shows the scene before the first action, frame k + 1 the outcome of low-
 """
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from enum import StrEnum
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,7 @@ import msgspec
 from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import find_images
 from infthor_eval.formats.packed.paths import SetPath
-from infthor_eval.formats.reading import read_json
+from infthor_eval.formats.reading import NOT_JSON, read_bytes, read_json
 
 LOG = "metadata.json"
 _HINT = "replay the trajectory again or restore the published file"
@@ -154,6 +155,9 @@ class Step(msgspec.Struct, omit_defaults=True):
     low_idx: int | None = None
 
 
+_STEPS = msgspec.json.Decoder(list[Step])
+
+
 def log_file(folder: SetPath) -> SetPath:
     """Return the file of the log of the trajectory in `metadata/<traj_id>`, if it has one."""
     return folder / LOG
@@ -168,6 +172,8 @@ def read_steps(folder: SetPath) -> list[Step]:
     images = _unlogged_images(folder)
     if images:
         return [Step(index, image.name) for index, image in enumerate(images)]
+    with suppress(*NOT_JSON):  # else it is of another layout, or broken
+        return _STEPS.decode(read_bytes(path, _HINT))
     document = read_json(path, _HINT)
     return [_step(path, index, entry) for index, entry in enumerate(_entries(path, document))]
 
