@@ -11,7 +11,7 @@ import click
 import infthor_eval
 from infthor_eval.cli.help import ExampleCommand
 from infthor_eval.cli.main import Program, run_program
-from infthor_eval.cli.options.values import PATH, split_names
+from infthor_eval.cli.options.values import PATH, default_option, split_names
 from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
 
 if TYPE_CHECKING:
@@ -164,23 +164,11 @@ def page(
     help="The secret: 32 hexadecimal digits or more (openssl rand -hex 32).",
 )
 @click.option("--out", type=PATH, required=True, metavar="DIR", help="Folder of both parts.")
-@click.option(
-    "--homes", type=click.IntRange(1), default=12, show_default=True, help="A trajectory in each."
-)
+@default_option("--homes", click.IntRange(1), 12, "A trajectory in each.")
 @click.option("--kinds", metavar="KIND,...", help="Kinds of edits, with commas; default: all.")
-@click.option(
-    "--min-steps",
-    type=click.IntRange(1),
-    default=300,
-    show_default=True,
-    help="Steps of each trajectory, at least.",
-)
-@click.option(
-    "--per-trajectory",
-    type=click.IntRange(1),
-    default=25,
-    show_default=True,
-    help="Paired questions of one trajectory, at most.",
+@default_option("--min-steps", click.IntRange(1), 300, "Steps of each trajectory, at least.")
+@default_option(
+    "--per-trajectory", click.IntRange(1), 25, "Paired questions of one trajectory, at most."
 )
 @worker_options
 def private_set(

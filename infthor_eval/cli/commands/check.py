@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from infthor_eval.cli.help import ExampleCommand, ExampleGroup
-from infthor_eval.cli.options.values import PATH, FiniteFloat, parse_model_args
+from infthor_eval.cli.options.values import PATH, FiniteFloat, default_option, parse_model_args
 
 if TYPE_CHECKING:
     from model_adapters.check import CheckResult
@@ -102,13 +102,7 @@ def check_memory(memory: str, memory_args: str) -> int:
     metavar="K=V,...",
     help="Options of MODEL; unnorm_key is sent to the server too.",
 )
-@click.option(
-    "--tolerance",
-    type=FiniteFloat(min=0),
-    default=1e-6,
-    show_default=True,
-    help="Largest difference of equal actions.",
-)
+@default_option("--tolerance", FiniteFloat(min=0), 1e-6, "Largest difference of equal actions.")
 def check_parity(
     model: str,
     reference_url: str,

@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from infthor_eval.cli.help import ExampleCommand
-from infthor_eval.cli.options.values import PATH, parse_model_args
+from infthor_eval.cli.options.values import PATH, default_option, parse_model_args
 
 
 @click.command(
@@ -23,11 +23,10 @@ from infthor_eval.cli.options.values import PATH, parse_model_args
 @click.option(
     "--model-args", default="", metavar="K=V,...", help="Its options (pretrained, dtype, ...)."
 )
-@click.option(
+@default_option(
     "--prompt",
-    type=click.Choice(("plain", "chat")),
+    click.Choice(("plain", "chat")),
     default="plain",
-    show_default=True,
     help="Its prompts: the bare sequence, or for the Qwen2.5-VL of branch dev the base model's "
     "chat template.",
 )

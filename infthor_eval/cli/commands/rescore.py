@@ -16,6 +16,7 @@ from infthor_eval.cli.options.values import (
     ModelList,
     ModelSpec,
     WholeNumber,
+    default_option,
     output_option,
 )
 
@@ -67,13 +68,7 @@ _JUDGE_PROMPT = "yes-no"
     help="Most tokens of a verdict; default: 16, and 64 for a score. A model that reasons first "
     "needs more.",
 )
-@click.option(
-    "--seed",
-    type=WholeNumber(),
-    default=0,
-    show_default=True,
-    help="Seed of the sample that measures the judge.",
-)
+@default_option("--seed", WholeNumber(), 0, "Seed of the sample that measures the judge.")
 @click.option(
     "--key", type=PATH, metavar="KEY", help="Key of a private set, for a run on its public part."
 )

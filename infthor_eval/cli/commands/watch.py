@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from infthor_eval.cli.help import ExampleCommand
-from infthor_eval.cli.options.values import PATH, FiniteFloat
+from infthor_eval.cli.options.values import PATH, FiniteFloat, default_option
 
 if TYPE_CHECKING:
     from PIL import Image
@@ -56,13 +56,7 @@ _FOLDER = Path("results/recordings")
 @click.option(
     "--scenes", type=PATH, help="Folder with recorded floor plans (thor_scenes/), as for the run."
 )
-@click.option(
-    "--fps",
-    type=FiniteFloat(0, 30, min_open=True),
-    default=2.0,
-    show_default=True,
-    help="Actions shown in a second.",
-)
+@default_option("--fps", FiniteFloat(0, 30, min_open=True), 2.0, "Actions shown in a second.")
 def command(
     run: Path,
     trajectory: str | None,

@@ -9,7 +9,14 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from infthor_eval.cli.help import ExampleCommand
-from infthor_eval.cli.options.values import PATH, SET, FiniteFloat, WholeNumber, floor_plans_option
+from infthor_eval.cli.options.values import (
+    PATH,
+    SET,
+    FiniteFloat,
+    WholeNumber,
+    default_option,
+    floor_plans_option,
+)
 from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
 from infthor_eval.errors import UsageError
 
@@ -27,26 +34,19 @@ if TYPE_CHECKING:
 )
 @click.argument("folder", metavar="SET", type=SET)
 @click.option("--out", required=True, type=PATH, help="CSV file to write.")
-@click.option(
-    "--seed", type=WholeNumber(0), default=0, show_default=True, help="Seed of every choice."
-)
-@click.option(
-    "--per-trajectory",
-    type=click.IntRange(1),
-    default=25,
-    show_default=True,
-    help="Questions per trajectory and moment, at most.",
+@default_option("--seed", WholeNumber(0), 0, "Seed of every choice.")
+@default_option(
+    "--per-trajectory", click.IntRange(1), 25, "Questions per trajectory and moment, at most."
 )
 @click.option(
     "--moments",
     type=click.IntRange(1),
     help="Ask at so many moments of each trajectory, evenly spaced. Default: at its end.",
 )
-@click.option(
+@default_option(
     "--min-share",
-    type=FiniteFloat(0, 1),
+    FiniteFloat(0, 1),
     default=0.001,
-    show_default=True,
     help="Share of a frame's pixels that an object must fill to count as visible.",
 )
 @click.option(
@@ -54,11 +54,10 @@ if TYPE_CHECKING:
     is_flag=True,
     help="Add question forms that are not in Table 3, with their own types.",
 )
-@click.option(
+@default_option(
     "--words",
-    type=click.Choice(["plain", "published"]),
+    click.Choice(["plain", "published"]),
     default="plain",
-    show_default=True,
     help="Plain English, or the published files' words with type names, to extend the published "
     "set.",
 )
@@ -121,12 +120,8 @@ def questions(
 @click.option(
     "--trajectories", type=PATH, help="Folder of the trajectories, if they are not in the set."
 )
-@click.option(
-    "--per-trajectory",
-    type=click.IntRange(2),
-    default=25,
-    show_default=True,
-    help="Pairs of one trajectory, at most; they come by two.",
+@default_option(
+    "--per-trajectory", click.IntRange(2), 25, "Pairs of one trajectory, at most; they come by two."
 )
 @click.option(
     "--rungs",
@@ -205,18 +200,13 @@ def _write(out: Path, questions: Sequence[Question], overwrite: bool) -> None:
 @click.argument("trajectories", nargs=-1, required=True, type=PATH)
 @click.option("--out", required=True, type=PATH, help="Folder of the set, new or to be continued.")
 @click.option("--kinds", metavar="KIND,...", help="Kinds of edits, with commas; default: all.")
-@click.option(
-    "--per-trajectory",
-    type=click.IntRange(1),
-    default=25,
-    show_default=True,
-    help="Paired questions of one trajectory, at most.",
+@default_option(
+    "--per-trajectory", click.IntRange(1), 25, "Paired questions of one trajectory, at most."
 )
-@click.option(
+@default_option(
     "--per-kind",
-    type=click.IntRange(1),
+    click.IntRange(1),
     default=2,
-    show_default=True,
     help="Twins of one kind and trajectory, at most; twice as many edits are tried.",
 )
 @click.option(
@@ -225,9 +215,7 @@ def _write(out: Path, questions: Sequence[Question], overwrite: bool) -> None:
     help="Ask so many frames after the evidence, while both worlds look the same: 10,30,100,300; "
     "with placebo pairs. Default: at the end.",
 )
-@click.option(
-    "--seed", type=WholeNumber(0), default=0, show_default=True, help="Seed of every choice."
-)
+@default_option("--seed", WholeNumber(0), 0, "Seed of every choice.")
 @click.option("--limit", type=click.IntRange(1), help="Trajectories, at most.")
 @click.option(
     "--unity", is_flag=True, help="Use AI2-THOR's own Unity build, not the embedded simulator."

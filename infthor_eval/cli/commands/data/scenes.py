@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from infthor_eval.cli.help import ExampleCommand, ExampleGroup
-from infthor_eval.cli.options.values import PATH, SceneName, floor_plans_option
+from infthor_eval.cli.options.values import PATH, SceneName, default_option, floor_plans_option
 
 _PICTURES = (".png", ".jpg", ".jpeg")
 
@@ -21,13 +21,7 @@ def command() -> None:
 @click.argument("name", type=SceneName())
 @floor_plans_option
 @click.option("--out", type=PATH, help="Image to write; default: NAME.png.")
-@click.option(
-    "--size",
-    type=click.IntRange(64, 2048),
-    default=600,
-    show_default=True,
-    help="Width and height of each view, pixels.",
-)
+@default_option("--size", click.IntRange(64, 2048), 600, "Width and height of each view, pixels.")
 @click.option("--overwrite", is_flag=True, help="Replace a file with other content.")
 def show(name: str, data: Path | None, out: Path | None, size: int, overwrite: bool) -> None:
     """Draw scene NAME from above and from where an agent sees most of it, side by side."""
