@@ -26,14 +26,7 @@ import msgspec
 from rich.text import Text
 
 from infthor_eval.cli.help import ExampleCommand
-from infthor_eval.cli.options.values import (
-    PATH,
-    SET,
-    ModelArgs,
-    ModelList,
-    ModelSpec,
-    split_names,
-)
+from infthor_eval.cli.options.values import PATH, SET, ModelArgs, ModelList, ModelSpec, split_names
 from infthor_eval.errors import UsageError, in_one_line
 from infthor_eval.nieh.published.hub_data import default_folder
 from infthor_eval.storage.folders import user_cache

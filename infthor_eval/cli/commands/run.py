@@ -9,12 +9,7 @@ import click
 
 from infthor_eval.cli.help import ExampleCommand
 from infthor_eval.cli.options.run import RunOptions, run_options
-from infthor_eval.cli.options.show import (
-    ShowOptions,
-    parse_trackers,
-    show_options,
-    tracker_options,
-)
+from infthor_eval.cli.options.show import ShowOptions, parse_trackers, show_options, tracker_options
 from infthor_eval.cli.options.values import WholeNumber
 from infthor_eval.cli.progress.notes import (
     NOTES,

@@ -29,12 +29,7 @@ from infthor_eval.generation.twins.pairing import (
 from infthor_eval.generation.twins.pictures import are_clearly_unlike
 from infthor_eval.generation.twins.replays import WORLD, Replayed, Replays
 from infthor_eval.generation.twins.rewriting import without_traces
-from infthor_eval.generation.twins.rungs import (
-    farthest_first,
-    ladders,
-    stretches,
-    that_stay,
-)
+from infthor_eval.generation.twins.rungs import farthest_first, ladders, stretches, that_stay
 from infthor_eval.generation.twins.tolerance import tolerance_of
 from infthor_eval.household.wording import canonical_type
 from infthor_eval.storage.digests import digest

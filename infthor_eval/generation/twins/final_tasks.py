@@ -24,11 +24,7 @@ from infthor_eval.generation.replay import ActionReplay, ReplayReport
 from infthor_eval.generation.rollout import Rollout
 from infthor_eval.generation.trace import ExecutedAction, RolloutError, Trace
 from infthor_eval.generation.twins.comparison import Difference, compare
-from infthor_eval.generation.twins.drafting import (
-    TwinSettings,
-    is_flipped,
-    name_worlds,
-)
+from infthor_eval.generation.twins.drafting import TwinSettings, is_flipped, name_worlds
 from infthor_eval.generation.twins.episode import Episode
 from infthor_eval.generation.twins.exchanges import Exchange
 from infthor_eval.generation.twins.final_places import Errand, are_apart, errands, place_in

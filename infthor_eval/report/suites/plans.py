@@ -32,11 +32,7 @@ from infthor_eval.report.presenter import (
 from infthor_eval.report.recordings.plan_pictures import plan_pictures
 from infthor_eval.report.recordings.room_map import draw_map
 from infthor_eval.report.suites.episode_columns import PLAN_COLUMNS
-from infthor_eval.report.suites.reward_curves import (
-    curves_on_page,
-    curves_result,
-    figure_section,
-)
+from infthor_eval.report.suites.reward_curves import curves_on_page, curves_result, figure_section
 from infthor_eval.report.web.sections import Section
 from infthor_eval.run import Run
 from infthor_eval.runs import UnitRecord
