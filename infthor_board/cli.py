@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import infthor_eval
-from infthor_eval.cli.help import ExampleCommand
 from infthor_eval.cli.main import Program, run_program
 from infthor_eval.cli.options.values import PATH, default_option, split_names
 from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
@@ -62,7 +61,7 @@ def _checking_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return command
 
 
-@_infthor_board.command("check", cls=ExampleCommand, example="infthor-board check my_submission")
+@_infthor_board.command("check", example="infthor-board check my_submission")
 @click.argument("folder", type=PATH)
 @click.option(
     "--others",
@@ -99,11 +98,7 @@ def check(
     return int(any(verdict.refusals for verdict in verdicts))
 
 
-@_infthor_board.command(
-    "page",
-    cls=ExampleCommand,
-    example="infthor-board page submissions --out leaderboard.html",
-)
+@_infthor_board.command("page", example="infthor-board page submissions --out leaderboard.html")
 @click.argument("folder", type=PATH)
 @click.option("--out", type=PATH, required=True, metavar="FILE.html", help="The page.")
 @click.option("--title", default=_TITLE, show_default=True, help="Title of the page.")
@@ -152,9 +147,7 @@ def page(
 
 
 @_infthor_board.command(
-    "private-set",
-    cls=ExampleCommand,
-    example="infthor-board private-set --seed-file secret.txt --out held_out",
+    "private-set", example="infthor-board private-set --seed-file secret.txt --out held_out"
 )
 @click.option(
     "--seed-file",

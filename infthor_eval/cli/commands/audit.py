@@ -5,16 +5,14 @@ from typing import TYPE_CHECKING
 
 import click
 
-from infthor_eval.cli.help import ExampleCommand
+from infthor_eval.cli.help import example_command
 from infthor_eval.cli.options.values import PATH, SET
 
 if TYPE_CHECKING:
     from infthor_eval.runs import RunSummary
 
 
-@click.command(
-    "audit", cls=ExampleCommand, example="infthor-eval audit SET --balanced qa_set_balanced.csv"
-)
+@example_command("audit", "infthor-eval audit SET --balanced qa_set_balanced.csv")
 @click.argument("set_folder", metavar="SET", type=SET)
 @click.argument("runs", metavar="[RUN]...", nargs=-1, type=PATH)
 @click.option(

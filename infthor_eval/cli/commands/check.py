@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from infthor_eval.cli.help import ExampleCommand, ExampleGroup
+from infthor_eval.cli.help import ExampleGroup
 from infthor_eval.cli.options.values import PATH, FiniteFloat, default_option, parse_model_args
 
 if TYPE_CHECKING:
@@ -23,11 +23,7 @@ def command() -> None:
     """Check a model, a memory or a policy of your own."""
 
 
-@command.command(
-    "adapter",
-    cls=ExampleCommand,
-    example="infthor-eval check adapter ./my_adapter.py:MyModel",
-)
+@command.command("adapter", example="infthor-eval check adapter ./my_adapter.py:MyModel")
 @click.argument("model")
 @click.option(
     "--model-args", default="", metavar="K=V,...", help="Options of MODEL (see `ls models MODEL`)."
@@ -52,9 +48,7 @@ def check_adapter(model: str, model_args: str) -> int:
     return code
 
 
-@command.command(
-    "memory", cls=ExampleCommand, example="infthor-eval check memory ./my_memory.py:MyMemory"
-)
+@command.command("memory", example="infthor-eval check memory ./my_memory.py:MyMemory")
 @click.argument("memory")
 @click.option(
     "--memory-args",
@@ -79,9 +73,7 @@ def check_memory(memory: str, memory_args: str) -> int:
 
 
 @command.command(
-    "parity",
-    cls=ExampleCommand,
-    example="infthor-eval check parity openvla --reference-url http://HOST:8000",
+    "parity", example="infthor-eval check parity openvla --reference-url http://HOST:8000"
 )
 @click.argument("model")
 @click.option(

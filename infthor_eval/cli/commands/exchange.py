@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from infthor_eval.cli.help import ExampleCommand
+from infthor_eval.cli.help import example_command
 from infthor_eval.cli.options.values import PATH, SET, output_option
 from infthor_eval.exports.registry import FORMATS
 
@@ -17,10 +17,8 @@ if TYPE_CHECKING:
 _RELATIONSHIPS = ("first_party", "third_party", "collaborative", "other")
 
 
-@click.command(
-    "export",
-    cls=ExampleCommand,
-    example="infthor-eval export results/*/nieh_mini-* --format every-eval-ever --out exported",
+@example_command(
+    "export", "infthor-eval export results/*/nieh_mini-* --format every-eval-ever --out exported"
 )
 @click.argument("runs", metavar="RUN...", nargs=-1, required=True, type=PATH)
 @click.option(
@@ -85,11 +83,7 @@ def _check_hub_name(option: str, name: str | None) -> None:
         raise UsageError(f"{option} {name!r:.60}: is not OWNER/NAME; write both, as on the hub")
 
 
-@click.command(
-    "import-replies",
-    cls=ExampleCommand,
-    example="infthor-eval import-replies LOG --data SET --out results",
-)
+@example_command("import-replies", "infthor-eval import-replies LOG --data SET --out results")
 @click.argument("logs", metavar="LOG...", nargs=-1, required=True, type=PATH)
 @click.option(
     "--data", type=SET, metavar="SET", help="Folder of the NIEH set that the replies are about."

@@ -4,14 +4,12 @@ from pathlib import Path
 
 import click
 
-from infthor_eval.cli.help import ExampleCommand
+from infthor_eval.cli.help import example_command
 from infthor_eval.cli.options.values import PATH, default_option, parse_model_args
 
 
-@click.command(
-    "import-checkpoint",
-    cls=ExampleCommand,
-    example="infthor-eval import-checkpoint global_step_1000 --out checkpoint",
+@example_command(
+    "import-checkpoint", "infthor-eval import-checkpoint global_step_1000 --out checkpoint"
 )
 @click.argument("checkpoint")
 @click.option(

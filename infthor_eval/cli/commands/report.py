@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from infthor_eval.cli.help import ExampleCommand
+from infthor_eval.cli.help import example_command
 from infthor_eval.cli.options.values import PATH, SET, WholeNumber
 
 if TYPE_CHECKING:
@@ -24,11 +24,7 @@ _TABLE_FORMS = ("csv", "latex", "markdown")
 _FOLDER = Path("results/figures")
 
 
-@click.command(
-    "report",
-    cls=ExampleCommand,
-    example="infthor-eval report results/*/nieh_mini-* --out report.html",
-)
+@example_command("report", "infthor-eval report results/*/nieh_mini-* --out report.html")
 @click.argument("runs", metavar="RUN...", nargs=-1, required=True, type=PATH)
 @click.option(
     "--out",

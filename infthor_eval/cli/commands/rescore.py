@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from infthor_eval.cli.help import ExampleCommand
+from infthor_eval.cli.help import example_command
 from infthor_eval.cli.options.values import (
     PATH,
     ModelArgs,
@@ -34,11 +34,7 @@ _JUDGE_TOKENS = {"yes-no": 16, "published": 64}
 _JUDGE_PROMPT = "yes-no"
 
 
-@click.command(
-    "rescore",
-    cls=ExampleCommand,
-    example="infthor-eval rescore results/blind/RUN --scorer my_scorer.py:measure",
-)
+@example_command("rescore", "infthor-eval rescore results/blind/RUN --scorer my_scorer.py:measure")
 @click.argument("folder", metavar="RUN", type=PATH)
 @click.option(
     "--scorer",

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from infthor_eval.cli.help import ExampleCommand, ExampleGroup
+from infthor_eval.cli.help import ExampleGroup
 from infthor_eval.cli.options.values import PATH, SET
 
 
@@ -13,7 +13,7 @@ def command() -> None:
     """Compute a table of the paper from its published files."""
 
 
-@command.command("4", cls=ExampleCommand, example="infthor-eval table 4 SET")
+@command.command("4", example="infthor-eval table 4 SET")
 @click.argument("set_folder", metavar="SET", type=SET)
 def table4(set_folder: Path) -> None:
     """Compute the paper's Table 4 from the scores in the published question files, beside the
@@ -31,9 +31,7 @@ def table4(set_folder: Path) -> None:
     print_table(published.table4(data), table_console())
 
 
-@command.command(
-    "final", cls=ExampleCommand, example="infthor-eval table final LOGS/eval_longhrz_*.log"
-)
+@command.command("final", example="infthor-eval table final LOGS/eval_longhrz_*.log")
 @click.argument("logs", metavar="LOG...", nargs=-1, required=True, type=PATH)
 def table_final(logs: tuple[Path, ...]) -> int:
     """Compute the paper's table of final long-horizon tasks from the published plan logs, beside

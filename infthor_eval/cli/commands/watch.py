@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from infthor_eval.cli.help import ExampleCommand
+from infthor_eval.cli.help import example_command
 from infthor_eval.cli.options.values import PATH, FiniteFloat, default_option
 
 if TYPE_CHECKING:
@@ -21,11 +21,9 @@ if TYPE_CHECKING:
 _FOLDER = Path("results/recordings")
 
 
-@click.command(
+@example_command(
     "watch",
-    cls=ExampleCommand,
-    example="infthor-eval watch results/scripted/RUN --trajectory kitchen-4-seed0 --out "
-    "scripted.mp4",
+    "infthor-eval watch results/scripted/RUN --trajectory kitchen-4-seed0 --out scripted.mp4",
 )
 @click.argument("run", type=PATH)
 @click.option("--trajectory", metavar="NAME", help="A trajectory of the run, if it has several.")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from infthor_eval.cli.help import ExampleCommand
+from infthor_eval.cli.help import example_command
 from infthor_eval.cli.options.values import (
     PATH,
     SceneName,
@@ -24,11 +24,7 @@ if TYPE_CHECKING:
     from infthor_eval.generation.generate_set import GenerationSummary
 
 
-@click.command(
-    "generate",
-    cls=ExampleCommand,
-    example="infthor-eval generate --scene kitchen-3 --seed 1 --out trajectories",
-)
+@example_command("generate", "infthor-eval generate --scene kitchen-3 --seed 1 --out trajectories")
 @click.option(
     "--scene",
     "scenes",

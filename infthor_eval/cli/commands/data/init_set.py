@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from infthor_eval.cli.help import ExampleCommand
+from infthor_eval.cli.help import example_command
 from infthor_eval.cli.options.values import PATH
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ several answers (green | blue) all are required. Both questions of a pair have i
 """
 
 
-@click.command("init-set", cls=ExampleCommand, example="infthor-eval init-set my_set")
+@example_command("init-set", "infthor-eval init-set my_set")
 @click.argument("folder", metavar="DIR", type=PATH)
 def command(folder: Path) -> None:
     """Write a film, a folder of frames and questions on them into DIR, which is new or empty.

@@ -5,15 +5,11 @@ from pathlib import Path
 
 import click
 
-from infthor_eval.cli.help import ExampleCommand
+from infthor_eval.cli.help import example_command
 from infthor_eval.cli.options.values import PATH, default_option
 
 
-@click.command(
-    "look-around",
-    cls=ExampleCommand,
-    example="infthor-eval look-around trajectories --out trajectories_level",
-)
+@example_command("look-around", "infthor-eval look-around trajectories --out trajectories_level")
 @click.argument("trajectories", type=PATH)
 @click.option("--out", type=PATH, required=True, help="File, or folder for the files of a folder.")
 @default_option(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from infthor_eval.cli.help import ExampleCommand
+from infthor_eval.cli.help import example_command
 from infthor_eval.cli.options.values import PATH, SET
 from infthor_eval.errors import UsageError
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 _out = click.option("--out", required=True, type=PATH, help="Folder of the new set, new or empty.")
 
 
-@click.command("pack", cls=ExampleCommand, example="infthor-eval pack SET --out PACKED")
+@example_command("pack", "infthor-eval pack SET --out PACKED")
 @click.argument("set_folder", metavar="SET", type=PATH)
 @_out
 @click.pass_context
@@ -47,7 +47,7 @@ def pack(context: click.Context, set_folder: Path, out: Path) -> None:
     _finish(context, packed, out)
 
 
-@click.command("unpack", cls=ExampleCommand, example="infthor-eval unpack PACKED --out SET")
+@example_command("unpack", "infthor-eval unpack PACKED --out SET")
 @click.argument("packed", metavar="PACKED", type=SET)
 @_out
 @click.option("--skip-damaged", is_flag=True, help="Leave out trajectories that cannot be read.")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from infthor_eval.cli.help import ExampleCommand
+from infthor_eval.cli.help import example_command
 from infthor_eval.cli.options.values import (
     PATH,
     SET,
@@ -29,9 +29,7 @@ if TYPE_CHECKING:
     from infthor_eval.generation.twins.twin_set import FinalTaskSummary, TwinSummary
 
 
-@click.command(
-    "questions", cls=ExampleCommand, example="infthor-eval questions SET --out SET/qa_set_mine.csv"
-)
+@example_command("questions", "infthor-eval questions SET --out SET/qa_set_mine.csv")
 @click.argument("folder", metavar="SET", type=SET)
 @click.option("--out", required=True, type=PATH, help="CSV file to write.")
 @default_option("--seed", WholeNumber(0), 0, "Seed of every choice.")
@@ -112,9 +110,7 @@ def questions(
     context.exit(1 if result.skipped else 0)
 
 
-@click.command(
-    "moments", cls=ExampleCommand, example="infthor-eval moments SET --out SET/moments.csv"
-)
+@example_command("moments", "infthor-eval moments SET --out SET/moments.csv")
 @click.argument("folder", metavar="SET", type=SET)
 @click.option("--out", required=True, type=PATH, help="CSV file to write.")
 @click.option(
@@ -196,7 +192,7 @@ def _write(out: Path, questions: Sequence[Question], overwrite: bool) -> None:
         partial.write_bytes(content)
 
 
-@click.command("twins", cls=ExampleCommand, example="infthor-eval twins trajectories --out TWINS")
+@example_command("twins", "infthor-eval twins trajectories --out TWINS")
 @click.argument("trajectories", nargs=-1, required=True, type=PATH)
 @click.option("--out", required=True, type=PATH, help="Folder of the set, new or to be continued.")
 @click.option("--kinds", metavar="KIND,...", help="Kinds of edits, with commas; default: all.")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from infthor_eval.cli.help import ExampleCommand
+from infthor_eval.cli.help import example_command
 from infthor_eval.cli.options.values import PATH, default_option, floor_plans_option
 from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
 
@@ -34,7 +34,7 @@ _PUBLISHED_QUALITY = "MediumCloseFitShadows"
 _SIZE = click.IntRange(1, 8192)  # pixels
 
 
-@click.command("replay", cls=ExampleCommand, example="infthor-eval replay trajectories --out SET")
+@example_command("replay", "infthor-eval replay trajectories --out SET")
 @click.argument("trajectories", nargs=-1, required=True, type=PATH)
 @click.option("--out", required=True, type=PATH, help="Folder of the set, new or to be continued.")
 @floor_plans_option

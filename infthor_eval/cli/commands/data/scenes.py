@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from infthor_eval.cli.help import ExampleCommand, ExampleGroup
+from infthor_eval.cli.help import ExampleGroup
 from infthor_eval.cli.options.values import PATH, SceneName, default_option, floor_plans_option
 
 _PICTURES = (".png", ".jpg", ".jpeg")
@@ -15,9 +15,7 @@ def command() -> None:
     """Draw a scene (show); get scenes for machines without Unity (dump from Unity, or fetch)."""
 
 
-@command.command(
-    "show", cls=ExampleCommand, example="infthor-eval scenes show kitchen-3 --out kitchen.png"
-)
+@command.command("show", example="infthor-eval scenes show kitchen-3 --out kitchen.png")
 @click.argument("name", type=SceneName())
 @floor_plans_option
 @click.option("--out", type=PATH, help="Image to write; default: NAME.png.")
@@ -56,11 +54,7 @@ def show(name: str, data: Path | None, out: Path | None, size: int, overwrite: b
     print_line(f"{name}: {path} (from above; from where most is seen)")
 
 
-@command.command(
-    "dump",
-    cls=ExampleCommand,
-    example="infthor-eval scenes dump FloorPlan1 FloorPlan201 --out scenes",
-)
+@command.command("dump", example="infthor-eval scenes dump FloorPlan1 FloorPlan201 --out scenes")
 @click.argument("names", nargs=-1, required=True)
 @click.option("--out", type=PATH, required=True, help="Folder of floor plans, new or existing.")
 @click.option(
@@ -100,11 +94,7 @@ def dump(
             print_line(f"{name}: {dump_scene(simulator, name, out, overwrite)} objects in {out}")
 
 
-@command.command(
-    "fetch",
-    cls=ExampleCommand,
-    example="infthor-eval scenes fetch FloorPlan1 FloorPlan201 --out scenes",
-)
+@command.command("fetch", example="infthor-eval scenes fetch FloorPlan1 FloorPlan201 --out scenes")
 @click.argument("names", nargs=-1)
 @click.option("--out", type=PATH, required=True, help="Folder of floor plans, new or existing.")
 @click.option("--overwrite", is_flag=True, help="Replace other recordings of these scenes.")

@@ -8,7 +8,7 @@ from typing import Any, Literal
 import click
 from msgspec.structs import replace
 
-from infthor_eval.cli.help import ExampleCommand
+from infthor_eval.cli.help import example_command
 from infthor_eval.cli.options.run import RunOptions
 from infthor_eval.cli.options.values import (
     PATH,
@@ -39,11 +39,7 @@ from infthor_eval.run import Run, with_distinct_names
 from infthor_eval.runs import RunOutcome, RunRequest, RunSummary, Suite, prepare_all
 
 
-@click.command(
-    "validate",
-    cls=ExampleCommand,
-    example="infthor-eval validate SET --model A,B,C,D --out VALIDATED",
-)
+@example_command("validate", "infthor-eval validate SET --model A,B,C,D --out VALIDATED")
 @click.argument("set_folder", metavar="SET", type=SET)
 @click.option(
     "--model",
