@@ -55,16 +55,15 @@ class TwinSettings(msgspec.Struct, frozen=True):
     rungs: tuple[int, ...] = ()
 
 
-class TwinDraft(msgspec.Struct):
-    """The twins of one trajectory.
+class Draft(msgspec.Struct):
+    """What was made of one trajectory.
 
     Attributes:
         digest: hash of the trajectory's JSON.
-        settings: how they were made.
+        settings: how it was made.
         rooms: scene of the trajectory.
         proposed: number of proposed edits by kind.
         rejected: number of rejected edits by kind and reason.
-        pairs: what was kept and has questions.
     """
 
     digest: str
@@ -72,6 +71,11 @@ class TwinDraft(msgspec.Struct):
     rooms: str
     proposed: dict[str, int] = msgspec.field(default_factory=dict)
     rejected: dict[str, dict[str, int]] = msgspec.field(default_factory=dict)
+
+
+class TwinDraft(Draft):
+    """The twins of one trajectory; `pairs` are those that were kept and have questions."""
+
     pairs: list[TwinPair] = msgspec.field(default_factory=list)
 
 
