@@ -11,6 +11,7 @@ from infthor_sim.objects import WALL, SimObject, SimObjectState
 from infthor_sim.render.primitives import Color, Form, Material, ShapePart
 
 Vector = Sequence[float] | Array
+CORNERS = ((-1, -1), (-1, 1), (1, -1), (1, 1))  # across and along
 _LINING = 0.003  # metres of the walls of open things that have the colour of their inside
 
 
@@ -81,6 +82,9 @@ class Builder:
         )
 
     box = partialmethod(add, Form.BOX)
+    wood = partialmethod(add, Form.BOX, material=Material.WOOD)
+    metal = partialmethod(add, Form.BOX, material=Material.METAL)
+    cloth = partialmethod(add, Form.BOX, material=Material.FABRIC)
     ball = partialmethod(add, Form.ELLIPSOID)
     tube = partialmethod(add, Form.CYLINDER)  # upright; `bottom` and `top` are its relative radii
     cup = partialmethod(add, Form.CUP)

@@ -95,7 +95,7 @@ def cabinet(b: Builder) -> None:
                      top=not b.item.hollow)  # fmt: skip
     elif not b.item.hollow:
         back = b.thick(_LEAF, 2)
-        b.box((0, 0, -back / 2), (1, 1, 1 - back / 2), shade_of(color, 0.8), Material.WOOD)
+        b.wood((0, 0, -back / 2), (1, 1, 1 - back / 2), shade_of(color, 0.8))
     else:  # nothing but a panel behind the door, so that the wall is not seen past its edges
         leaf = b.thick(_LEAF, 2)
         b.span((-1, -1, 1 - 1.4 * leaf), (1, 1, 1 - leaf), shade_of(color, 0.8), Material.WOOD)
@@ -120,8 +120,8 @@ def drawer(b: Builder) -> None:
         b.span((gap - 1, floor, back), (x - 1, _TRAY, front), side, Material.WOOD, glow=_LIT)
         b.span((1 - x, floor, back), (1 - gap, _TRAY, front), side, Material.WOOD, glow=_LIT)
     else:
-        b.box((0, 0, -leaf), (0.94, 0.92, 1 - leaf), shade_of(color, 0.75), Material.WOOD)
-    b.box((0, 0, out + 1 - leaf), (0.985, 0.96, leaf), color, Material.WOOD)
+        b.wood((0, 0, -leaf), (0.94, 0.92, 1 - leaf), shade_of(color, 0.75))
+    b.wood((0, 0, out + 1 - leaf), (0.985, 0.96, leaf), color)
     b.rod(
         (0, 0.25, out + 1 + 0.012 / max(float(b.half[2]), 0.01)),
         0.006,
@@ -137,7 +137,7 @@ def fridge(b: Builder) -> None:
     color = (WHITE, STEEL, (0.86, 0.87, 0.88))[b.style % 3]
     if b.state.openness == 0:
         z = b.thick(0.025, 2)
-        b.box((0, 0, -z), (1, 1, 1 - z), shade_of(color, 0.92), Material.METAL)
+        b.metal((0, 0, -z), (1, 1, 1 - z), shade_of(color, 0.92))
     else:
         _lit_inside(b, shade_of(color, 0.92))
     _door(b, color, Material.METAL, DARK, -0.97, 0.3, _FRIDGE_GRIP)
@@ -216,17 +216,17 @@ def microwave(b: Builder) -> None:
     panel = shade_of(body, 0.9)
     door = shade_of(body, 0.85)
     if b.state.openness == 0:
-        b.box((0, 0, -z), (1, 1, 1 - z), body, Material.METAL)
+        b.metal((0, 0, -z), (1, 1, 1 - z), body)
         window: Color = (0.9, 0.75, 0.4) if b.state.toggled else _WINDOW
-        b.box((0.22, 0, 1 - z), (0.74, 0.92, z), door, Material.METAL)
+        b.metal((0.22, 0, 1 - z), (0.74, 0.92, z), door)
         b.box((0.27, 0, 1 - z / 2), (0.58, 0.68, z), window, Material.GLASS, glow=lit)
-        b.box((-0.44, 0, 1 + z), (x, 0.7, z), CHROME, Material.METAL)
+        b.metal((-0.44, 0, 1 + z), (x, 0.7, z), CHROME)
     else:
         b.open_front(body, shade_of(STEEL, 1.1), Material.METAL, b.item.floors[0], glow=0.3)
         b.tube(
             (0.2, b.floor, 0), (0.55, b.thick(0.002, 1), 0.75), (0.8, 0.86, 0.88), Material.GLASS
         )
-        b.box((-0.76, 0, 0), (0.22, 0.94, 0.98), panel, Material.METAL)
+        b.metal((-0.76, 0, 0), (0.22, 0.94, 0.98), panel)
         wide = float(b.half[0])
         high = float(b.half[1])
         angle = DOOR_SWING * b.state.openness
@@ -273,7 +273,7 @@ def safe(b: Builder) -> None:
     body: Color = (0.3, 0.32, 0.35)
     if b.state.openness == 0:
         z = b.thick(0.02, 2)
-        b.box((0, 0, -z), (1, 1, 1 - z), body, Material.METAL)
+        b.metal((0, 0, -z), (1, 1, 1 - z), body)
     else:
         b.open_front(body, shade_of(body, 1.7), Material.METAL, b.item.floors[0], glow=_LIT)
     _bands(b, shade_of(body, 1.7))
@@ -303,11 +303,11 @@ def _bands(b: Builder, color: Color) -> None:
     for level in (-0.86, 0.86):
         b.span((-1 - x, level - 0.14, -1 - z), (1 + x, level + 0.14, -1), color, Material.METAL)
         for side in (-1, 1):
-            b.box((side, level, (front - 1) / 2), (x, 0.14, (front + 1) / 2), color, Material.METAL)
-            b.box((side * 0.86, 0, -1), (0.14, 0.86, z), color, Material.METAL)
+            b.metal((side, level, (front - 1) / 2), (x, 0.14, (front + 1) / 2), color)
+            b.metal((side * 0.86, 0, -1), (0.14, 0.86, z), color)
             b.ball((side, level, -0.86), (3 * x, 0.06, 0.06), _BOLT)
             b.ball((side * 0.86, level, -1), (0.06, 0.06, 3 * z), _BOLT)
-    b.box((0, 1, (front - 1) / 2), (0.14, y, (front + 1) / 2), color, Material.METAL)
+    b.metal((0, 1, (front - 1) / 2), (0.14, y, (front + 1) / 2), color)
 
 
 @draws
