@@ -42,7 +42,7 @@ def check_memory(memory: Memory) -> Iterator[CheckResult]:
     with ScratchFolder() as folder:
         checks: dict[str, Callable[[], None]] = {
             MEMBERS: partial(_check_members, memory),
-            "identity": partial(check_identity_values, memory.identity),
+            "identity": lambda: check_identity_values(memory.identity),
             "recalls": partial(_check_recalls, memory, folder),
             "empty": partial(_check_empty, memory, folder),
             "budget": partial(_check_budget, memory, folder),

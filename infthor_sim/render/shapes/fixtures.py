@@ -59,13 +59,8 @@ def _basin(b: Builder, steel: bool) -> None:
     color = shade_of(STEEL, 1.12) if steel else _CERAMIC
     b.open_top(color, Material.METAL if steel else Material.PLAIN, 0.014, b.floor, glow=0.22)
     level = b.floor - b.thick(0.001, 1)
-    b.tube(
-        (0, level, 0),
-        (b.thick(0.04, 0), b.thick(0.0015, 1), b.thick(0.04, 2)),
-        CHROME,
-        Material.METAL,
-    )
-    b.tube((0, level, 0), (b.thick(0.028, 0), b.thick(0.002, 1), b.thick(0.028, 2)), DARK)
+    b.tube((0, level, 0), b.extent(0.04, 0.0015, 0.04), CHROME, Material.METAL)
+    b.tube((0, level, 0), b.extent(0.028, 0.002, 0.028), DARK)
 
 
 @draws
@@ -107,9 +102,7 @@ def toilet(b: Builder) -> None:
 @draws
 def window(b: Builder) -> None:
     """A bright pane in a white frame with a cross, at the wall side of its box."""
-    x = b.thick(0.03, 0)
-    y = b.thick(0.03, 1)
-    z = b.thick(0.05, 2)
+    x, y, z = b.extent(0.03, 0.03, 0.05)
     at = z - 1
     b.box((0, 0, at), (1 - x, 1 - y, z * 0.85), _SKY, Material.GLASS, glow=0.8)
     for side in (-1, 1):
@@ -238,9 +231,7 @@ def shower_head(b: Builder) -> None:
 @draws
 def shower_glass(b: Builder) -> None:
     """A frame around a pane that one sees through: only its edges are drawn."""
-    x = b.thick(0.012, 0)
-    y = b.thick(0.012, 1)
-    z = b.thick(0.012, 2)
+    x, y, z = b.extent(0.012, 0.012, 0.012)
     flat = 0 if b.half[0] < b.half[2] else 2
     for side in (-1, 1):
         if flat == 0:

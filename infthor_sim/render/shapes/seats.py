@@ -18,9 +18,7 @@ def chair(b: Builder) -> None:
     """A wooden chair with a back of slats."""
     color = pick(WOODS, b.style)
     level = _seat_level(b, -0.05)
-    x = b.thick(0.018, 0)
-    y = b.thick(0.015, 1)
-    z = b.thick(0.018, 2)
+    x, y, z = b.extent(0.018, 0.015, 0.018)
     b.wood((0, level - y, 0), (1, y, 1), color)
     for side in (-1, 1):
         b.box(

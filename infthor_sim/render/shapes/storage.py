@@ -149,7 +149,7 @@ def fridge(b: Builder) -> None:
 
 def _fridge_sides(b: Builder) -> None:
     """What tells a fridge from the side: the seals behind its doors, a dark foot, notes."""
-    x, z = b.thick(0.004, 0), b.thick(0.006, 2)
+    x, z = b.sides(0.004, 0.006)
     seal = 1 - b.thick(_FRIDGE_GRIP + _LEAF, 2) - z
     for side in (-1, 1):
         if b.state.openness == 0:
@@ -211,7 +211,7 @@ def _door_racks(b: Builder) -> None:
 def microwave(b: Builder) -> None:
     """A microwave oven: a dark window, a panel of keys, vents behind; lit inside while it runs."""
     body = (STEEL, DARK, WHITE)[b.style % 3]
-    x, z = b.thick(0.02, 0), b.thick(0.01, 2)
+    x, z = b.sides(0.02, 0.01)
     lit = 0.75 if b.state.toggled else 0.0
     panel = shade_of(body, 0.9)
     door = shade_of(body, 0.85)
@@ -258,7 +258,7 @@ def microwave(b: Builder) -> None:
 
 def _vents(b: Builder) -> None:
     """Dark slots, a plate of data and the root of the cord on the back, and slots on both sides."""
-    x, z = b.thick(0.003, 0), b.thick(0.003, 2)
+    x, z = b.sides(0.003, 0.003)
     for level in (0.6, 0.28, -0.04):
         b.box((0.35, level, -1), (0.5, 0.09, z), BLACK)
         for side in (-1, 1):
@@ -298,7 +298,7 @@ def safe(b: Builder) -> None:
 
 def _bands(b: Builder, color: Color) -> None:
     """Steel bands up the sides and along the edges of back and sides, with bolts."""
-    x, y, z = b.thick(0.004, 0), b.thick(0.004, 1), b.thick(0.004, 2)
+    x, y, z = b.extent(0.004, 0.004, 0.004)
     front = 1 - b.thick(0.04, 2)
     for level in (-0.86, 0.86):
         b.span((-1 - x, level - 0.14, -1 - z), (1 + x, level + 0.14, -1), color, Material.METAL)
@@ -327,7 +327,7 @@ def carton(b: Builder) -> None:
 
 def _body(b: Builder, color: Color, share: float) -> None:
     """Add four sides and a bottom, within the share of the box that the flaps leave."""
-    x, z = b.thick(0.006, 0), b.thick(0.006, 2)
+    x, z = b.sides(0.006, 0.006)
     b.span((-share, -1, -share), (share, b.floor, share), shade_of(color, 0.88), glow=0.12)
     for side in (-1, 1):
         b.box((side * (share - x), 0, 0), (x, 1, share), color, glow=0.12)

@@ -60,7 +60,7 @@ def _turn(rect: Rect, quarters: int) -> Rect:
 
 def _carcass(b: Builder, color: Color, top: float) -> None:
     """Add sides and back from the floor up to `top`; the front is left to drawers."""
-    x, z = b.thick(0.012, 0), b.thick(0.01, 2)
+    x, z = b.sides(0.012, 0.01)
     middle = (top - 1) / 2
     half = (top + 1) / 2
     for side in (-1, 1):
@@ -86,7 +86,7 @@ def _top(b: Builder, color: Color, edge: float) -> float:
 
 
 def _legs(b: Builder, under: float, thick: float, color: Color) -> None:
-    x, z = b.thick(thick, 0), b.thick(thick, 2)
+    x, z = b.sides(thick, thick)
     for sx, sz in CORNERS:
         b.wood((sx * (0.97 - x), (under - 1) / 2, sz * (0.97 - z)), (x, (under + 1) / 2, z), color)
 
@@ -103,7 +103,7 @@ def desk(b: Builder) -> None:
     if b.item.hollow:
         _carcass(b, color, under)
         return
-    x, z = b.thick(0.015, 0), b.thick(0.01, 2)
+    x, z = b.sides(0.015, 0.01)
     wide = min(0.35, b.thick(0.2, 0))
     b.span((-0.98, -1, -0.94), (-0.98 + 2 * x, under, 0.94), shade_of(color, 0.85), Material.WOOD)
     b.span(
@@ -140,7 +140,7 @@ def dining_table(b: Builder) -> None:
     b.cloth((0, level, 0), b.lengthwise(0.999, half, 0.3), runner)
     b.cloth((0, level, 0), b.lengthwise(0.9, half * 1.3, 0.22), shade_of(runner, 1.3))
     leg = shade_of(color, 0.78)
-    x, z = b.thick(0.05, 0), b.thick(0.05, 2)
+    x, z = b.sides(0.05, 0.05)
     low = -1 + b.thick(0.05, 1)
     neck = under - b.thick(0.12, 1)
     for sx, sz in CORNERS:
@@ -172,9 +172,7 @@ def side_table(b: Builder) -> None:
     half = min(b.thick(0.07, 1), (under + 1) / 4)
     b.wood((0, under - half, 0), (0.93, half, 0.93), shade_of(color, 0.8))
     b.wood((0, under - half, 0.94), (0.8, half * 0.8, 0.02), shade_of(color, 1.12))
-    b.ball(
-        (0, under - half, 0.98), (b.thick(0.016, 0), b.thick(0.016, 1), b.thick(0.016, 2)), CHROME
-    )
+    b.ball((0, under - half, 0.98), b.extent(0.016, 0.016, 0.016), CHROME)
     b.wood((0, -0.72, 0), (0.92, b.thick(0.01, 1), 0.92), shade_of(color, 0.9))
 
 
@@ -209,11 +207,7 @@ def chest(b: Builder) -> None:
         level = middle + half * (0.6 - row * 0.6)
         for side in (-1, 1):
             b.wood((side * 0.48, level, 0.96), (0.45, 0.26, 0.03), color)
-            b.ball(
-                (side * 0.48, level, 1.0),
-                (b.thick(0.015, 0), b.thick(0.015, 1), b.thick(0.015, 2)),
-                CHROME,
-            )
+            b.ball((side * 0.48, level, 1.0), b.extent(0.015, 0.015, 0.015), CHROME)
 
 
 def _drawer_frame(b: Builder, color: Color, top: float) -> None:
@@ -240,9 +234,7 @@ def shelf(b: Builder) -> None:
 def shelving(b: Builder) -> None:
     """An open rack on posts."""
     color = pick(WOODS, b.style)
-    x = b.thick(0.015, 0)
-    y = b.thick(0.01, 1)
-    z = b.thick(0.015, 2)
+    x, y, z = b.extent(0.015, 0.01, 0.015)
     for side_x, side_z in CORNERS:
         b.wood((side_x * (1 - x), 0, side_z * (1 - z)), (x, 1, z), color)
     levels: Sequence[float] = (-0.9, 1 - y) if b.item.hollow else (-0.9, -0.3, 0.3, 1 - y)
