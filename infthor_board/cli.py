@@ -12,6 +12,9 @@ import infthor_eval
 from infthor_eval.cli.main import Program, run_program
 from infthor_eval.cli.options.values import PATH, default_option, split_names
 from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
+from infthor_eval.cli.progress.notes import NOTES, print_failure, print_note
+from infthor_eval.storage.files import hold_folder, prepare_file
+from infthor_eval.terminal import print_line, progress_bar
 
 if TYPE_CHECKING:
     from infthor_board.checking import Verdict
@@ -88,8 +91,6 @@ def check(
     """
     import msgspec
 
-    from infthor_eval.terminal import print_line
-
     verdicts = _check(folder, sets, key, allow, include, others)
     for verdict in verdicts:
         lines = [msgspec.json.encode(_document(verdict)).decode()] if as_json else _lines(verdict)
@@ -121,8 +122,6 @@ def page(
     """
     from infthor_board.page import write_leaderboard
     from infthor_board.rows import published_rows, rows_of
-    from infthor_eval.cli.progress.notes import print_failure, print_note
-    from infthor_eval.storage.files import prepare_file
 
     prepare_file(out)
     verdicts = _check(folder, sets, key, allow, include)
@@ -182,9 +181,6 @@ def private_set(
     from infthor_board.private_sets import make_private_set, read_secret
     from infthor_eval.cli.commands.data.questions import parse_kinds
     from infthor_eval.cli.progress.bar import PacedBar
-    from infthor_eval.cli.progress.notes import NOTES, print_failure, print_note
-    from infthor_eval.storage.files import hold_folder
-    from infthor_eval.terminal import print_line, progress_bar
 
     secret = read_secret(seed_file)
     worker_settings = parse_worker_settings(**workers)

@@ -11,6 +11,7 @@ import click
 
 from infthor_eval.cli.help import ExampleGroup
 from infthor_eval.cli.options.values import PATH, FiniteFloat, default_option, parse_model_args
+from infthor_eval.cli.progress.notes import prints_as_notes
 
 if TYPE_CHECKING:
     from model_adapters.check import CheckResult
@@ -34,7 +35,6 @@ def check_adapter(model: str, model_args: str) -> int:
     The model gets a few dozen short requests with frames of one colour. Each clause of the contract
     has a line of output; docs/own-models.md explains them. Exit code 1 if a clause is broken.
     """
-    from infthor_eval.cli.progress.notes import prints_as_notes
     from model_adapters import run_checks
     from model_adapters.refusals import wrap_closing
     from model_adapters.registry import build
@@ -63,7 +63,6 @@ def check_memory(memory: str, memory_args: str) -> int:
     contract has a line of output; docs/memories.md explains them. Exit code 1 if a clause is
     broken.
     """
-    from infthor_eval.cli.progress.notes import prints_as_notes
     from infthor_eval.memory import check, open_memory, parse_options
 
     options = parse_options(memory_args) or {}
@@ -107,7 +106,6 @@ def check_parity(
 
     Exit code 1 if one differs.
     """
-    from infthor_eval.cli.progress.notes import prints_as_notes
     from infthor_eval.report.terminal import print_table, table_console
     from model_adapters.policies.parity import (
         INSTRUCTIONS,
@@ -135,7 +133,6 @@ def check_parity(
 
 def _print_checks(name: str, results: Iterable[CheckResult]) -> int:
     """Print a line a result and one for all; return the exit code, 1 if a clause is broken."""
-    from infthor_eval.cli.progress.notes import prints_as_notes
     from infthor_eval.terminal import print_line
 
     n_broken = 0

@@ -19,6 +19,7 @@ from infthor_eval.cli.options.values import (
     default_option,
     output_option,
 )
+from infthor_eval.cli.progress.notes import NOTES, print_failure, print_note, prints_as_notes
 
 if TYPE_CHECKING:
     from infthor_eval.nieh.records import NiehAnswer
@@ -86,7 +87,6 @@ def command(
     Neither the set nor the model is needed. Replies that are not there stay failed. The exit code
     is 1 if your scorer fails on a reply, or the judge cannot be asked.
     """
-    from infthor_eval.cli.progress.notes import print_failure, prints_as_notes
     from infthor_eval.formats.replies.answer_key import read_key
     from infthor_eval.nieh.own_scorers import find_scorer
     from infthor_eval.nieh.rescoring.keyed import with_key
@@ -131,7 +131,6 @@ def read_source(run: Run) -> Source:
 def _load_judge(
     judge: ModelSpec, more: Mapping[str, str], max_new_tokens: int, seed: int, prompt: str
 ) -> AbstractContextManager[Judge]:
-    from infthor_eval.cli.progress.notes import print_note, prints_as_notes
     from infthor_eval.nieh.rescoring.judging import Judge
     from model_adapters import model_note
 
@@ -144,7 +143,6 @@ def _load_judge(
 
 def _store(rescoring: Rescoring, output: Path) -> Rescored:
     from infthor_eval.cli.progress.bar import PacedBar
-    from infthor_eval.cli.progress.notes import NOTES
     from infthor_eval.terminal import progress_bar
 
     with progress_bar(NOTES) as progress:
@@ -180,8 +178,6 @@ def _print(rescoring: Rescoring, rescored: Rescored) -> None:
 
 
 def _print_counts(report: RescoringReport) -> None:
-    from infthor_eval.cli.progress.notes import print_note
-
     counts = (
         (report.n_failed, "failed by the scorer"),
         (report.n_without_reply, "without a reply stay failed"),
@@ -201,8 +197,6 @@ def _print_counts(report: RescoringReport) -> None:
 
 
 def _print_change(name: str, change: Change) -> None:
-    from infthor_eval.cli.progress.notes import print_note
-
     print_note(
         f"{name}: {change.n_differ} of {change.n_before} scores differ from those in the journal"
     )
@@ -214,7 +208,6 @@ def _print_change(name: str, change: Change) -> None:
 
 def _print_failures(rescored: Rescored) -> int:
     """Print why replies could not be scored or judged; return the number of these."""
-    from infthor_eval.cli.progress.notes import print_failure
     from infthor_eval.cli.results import print_failures
     from infthor_eval.reasons import count_reasons
 

@@ -6,6 +6,7 @@ import click
 
 from infthor_eval.cli.help import ExampleGroup
 from infthor_eval.cli.options.values import PATH, SET
+from infthor_eval.cli.progress.notes import print_left_out, print_refused
 
 
 @click.group("table", cls=ExampleGroup, example="infthor-eval table 4 SET")
@@ -21,7 +22,6 @@ def table4(set_folder: Path) -> None:
 
     SET is a folder with both files. It needs no frames.
     """
-    from infthor_eval.cli.progress.notes import print_left_out
     from infthor_eval.formats.nieh_set import NiehSet
     from infthor_eval.nieh.published import table4 as published
     from infthor_eval.report.terminal import print_table, table_console
@@ -40,7 +40,6 @@ def table_final(logs: tuple[Path, ...]) -> int:
     The name of a LOG says which row it is; a log of another name has a row of its own. A line
     without counts is counted and named; the exit code is then 1.
     """
-    from infthor_eval.cli.progress.notes import print_refused
     from infthor_eval.formats.plan_logs import read_plan_log
     from infthor_eval.plans.published.final_table import final_table
     from infthor_eval.report.terminal import print_table, table_console

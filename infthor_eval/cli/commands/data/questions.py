@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +19,10 @@ from infthor_eval.cli.options.values import (
     floor_plans_option,
 )
 from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
-from infthor_eval.errors import UsageError
+from infthor_eval.cli.progress.bar import PacedBar
+from infthor_eval.errors import UsageError, wrap_errors
+from infthor_eval.storage.files import hold_folder, prepare_file, refuse_overwrite, write_atomically
+from infthor_eval.terminal import console, error_console, print_line, progress_bar
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -79,10 +83,7 @@ def questions(
 
     Exit code 1 if a trajectory of the set cannot be read.
     """
-    from infthor_eval.cli.progress.bar import PacedBar
     from infthor_eval.generation.questions.generate import generate_questions
-    from infthor_eval.storage.files import prepare_file
-    from infthor_eval.terminal import error_console, print_line, progress_bar
 
     worker_settings = parse_worker_settings(**workers)
     prepare_file(out)
@@ -142,14 +143,10 @@ def moments(
     No second world is needed, and which moment is the later one tells nothing. Exit code 1 if a
     trajectory of the set cannot be read.
     """
-    from functools import partial
 
-    from infthor_eval.cli.progress.bar import PacedBar
     from infthor_eval.generation.moment_pairs import pair_moments
     from infthor_eval.generation.questions.generate import trajectory_folders
     from infthor_eval.nieh.scoring import score
-    from infthor_eval.storage.files import prepare_file
-    from infthor_eval.terminal import console, error_console, progress_bar
 
     ages = _parse_rungs(rungs)
     if not ages:
@@ -178,9 +175,7 @@ def moments(
 
 def _write(out: Path, questions: Sequence[Question], overwrite: bool) -> None:
     """Write a question file, and refuse to replace one that holds other questions."""
-    from infthor_eval.errors import wrap_errors
     from infthor_eval.formats.qa_csv import encode_questions
-    from infthor_eval.storage.files import refuse_overwrite, write_atomically
 
     content = encode_questions(questions)
     if not overwrite:
@@ -248,15 +243,11 @@ def twins(
     are done are not tried again. With --final-tasks, writes trajectories for the task
     infthor_twins. Exit code 1 if twins of a trajectory cannot be made at all.
     """
-    from functools import partial
 
-    from infthor_eval.cli.progress.bar import PacedBar
     from infthor_eval.generation.replay_set import select
     from infthor_eval.generation.twins.drafting import TwinSettings
     from infthor_eval.generation.twins.twin_set import make_final_tasks, make_twins
     from infthor_eval.nieh.scoring import score
-    from infthor_eval.storage.files import hold_folder
-    from infthor_eval.terminal import console, error_console, progress_bar
     from infthor_eval.thor import launch
     from infthor_eval.thor.supplement import supplement_file
 

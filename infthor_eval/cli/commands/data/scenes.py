@@ -6,6 +6,8 @@ import click
 
 from infthor_eval.cli.help import ExampleGroup
 from infthor_eval.cli.options.values import PATH, SceneName, default_option, floor_plans_option
+from infthor_eval.storage.files import hold_folder, prepare_file, refuse_overwrite, write_atomically
+from infthor_eval.terminal import print_line
 
 _PICTURES = (".png", ".jpg", ".jpeg")
 
@@ -28,8 +30,6 @@ def show(name: str, data: Path | None, out: Path | None, size: int, overwrite: b
     from PIL import Image
 
     from infthor_eval.errors import wrap_errors
-    from infthor_eval.storage.files import prepare_file, refuse_overwrite, write_atomically
-    from infthor_eval.terminal import print_line
     from infthor_eval.thor.launch import embedded_launch
     from infthor_eval.thor.scenes import scene_pictures
     from infthor_eval.thor.simulator import Simulator
@@ -82,8 +82,6 @@ def dump(
 
     Other commands take that folder as --data, to run these scenes in the embedded simulator.
     """
-    from infthor_eval.storage.files import hold_folder
-    from infthor_eval.terminal import print_line
     from infthor_eval.thor import launch
     from infthor_eval.thor.scenes import dump_scene
     from infthor_eval.thor.simulator import Simulator
@@ -104,8 +102,6 @@ def fetch(names: tuple[str, ...], out: Path, overwrite: bool, endpoint: str | No
 
     Other commands take that folder as --data, to run these scenes in the embedded simulator.
     """
-    from infthor_eval.storage.files import hold_folder
-    from infthor_eval.terminal import print_line
     from infthor_eval.thor.published_scenes import HOST, PUBLISHED_SCENES, fetch_scene
 
     unknown = [name for name in names if name not in PUBLISHED_SCENES]
