@@ -110,12 +110,6 @@ class Run:
         other.__dict__.pop("header", None)
         return other
 
-    def with_records(self, records: Sequence[UnitRecord[Any]]) -> Self:
-        """Return the run, by the name and the marks that it has, with some of its records alone."""
-        other = copy(self.read())
-        other.records = tuple(records)
-        return other
-
     def read(self) -> Self:
         """Read the records now, so that what cannot be read is refused before any work."""
         _ = self.header  # which tells whether all units have a record

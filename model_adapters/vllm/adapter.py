@@ -4,7 +4,11 @@ import functools
 from typing import Any, ClassVar
 
 from model_adapters.hf.adapter import CheckpointAdapter
-from model_adapters.hf.families.hf_vlm import HfVlm, ProcessorFamily, family_of
+from model_adapters.hf.families.hf_vlm import (
+    HfVlm,
+    ProcessorFamily,
+    family_of,
+)
 from model_adapters.hf.families.llava_onevision import LlavaOnevision
 from model_adapters.hf.families.load_check import require_same_ids
 from model_adapters.hf.families.pixtral import Pixtral
