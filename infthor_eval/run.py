@@ -36,7 +36,7 @@ from infthor_eval.suites import find_presenter, find_suite
 
 if TYPE_CHECKING:
     from infthor_eval.rates import Rate
-    from infthor_eval.report.presenter import Presenter
+    from infthor_eval.report.plain import PlainPresenter
     from infthor_eval.runs.suite import Suite
 
 _INCOMPLETE = " (incomplete)"  # ends the name of a run that is not whole
@@ -121,7 +121,7 @@ class Run:
         return find_suite(self.listed.suite)
 
     @cached_property
-    def presenter(self) -> Presenter:
+    def presenter(self) -> PlainPresenter:
         """The presenter of its suite."""
         return find_presenter(self.listed.suite)
 
