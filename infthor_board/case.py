@@ -1,8 +1,8 @@
 """What a check is given, and what it is."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Protocol
+from functools import partial
 
 from infthor_board.expected import Expected
 from infthor_board.reading import Problem, Submission
@@ -19,11 +19,13 @@ class Case:
         submission: the submission.
         tasks: the tasks of all its runs, those that could be set up.
         is_candidate: False for one that is there to be compared with alone.
+        others: all other submissions.
     """
 
     submission: Submission
     tasks: Sequence[Expected]
     is_candidate: bool = True
+    others: Sequence["Case"] = ()
 
     @property
     def shown(self) -> list[Expected]:
@@ -35,24 +37,40 @@ class Case:
         return [task for task in self.tasks if task.run.header.config.frames == frames]
 
 
-class Check(Protocol):
+@dataclass(frozen=True)
+class Remark:
+    """What is to be known of a submission, and does not refuse it."""
+
+    text: str
+
+
+Reasons = Iterator[str | Remark]
+
+
+@dataclass(frozen=True)
+class Check:
     """A check.
 
     Attributes:
         name: its name in reasons.
-        reason: why it is made, in a line.
+        reasons: yields why a submission is refused, or what is to be known of it.
     """
 
-    name: ClassVar[str]
-    reason: ClassVar[str]
+    name: str
+    reasons: Callable[[Case], Reasons]
 
-    def problems(self, case: Case, others: Sequence[Case]) -> Iterator[Problem]:
-        """Yield why the submission is refused, or what is to be known of it.
+    def problems(self, case: Case) -> Iterator[Problem]:
+        """Yield the reasons under the name of the check."""
+        for reason in self.reasons(case):
+            if isinstance(reason, Remark):
+                yield Problem(self.name, reason.text, is_warning=True)
+            else:
+                yield Problem(self.name, reason)
 
-        Args:
-            case: the submission.
-            others: all other submissions.
-        """
+
+def check(name: str) -> Callable[[Callable[[Case], Reasons]], Check]:
+    """Make a check of a function that yields its reasons."""
+    return partial(Check, name)
 
 
 def count(what: str, names: Sequence[str]) -> str:

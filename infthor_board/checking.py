@@ -5,61 +5,35 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from infthor_board.case import Case, Check
-from infthor_board.checks.replies import (
-    AboveBlind,
-    AboveOtherHome,
-    CopiedRecords,
-    CopiedReplies,
-    KeyForm,
-    KeyScore,
-    KeySpelling,
-    KeyWords,
-    PairsOfBothWorlds,
-    PairsOfWhatDiffers,
-    PairsWithSingles,
-)
-from infthor_board.checks.requests import SameRequests
-from infthor_board.checks.runs import (
-    AllThere,
-    AskedOnce,
-    CompleteIdentity,
-    NoneOfAnotherSet,
-    SameModel,
-    SameResults,
-    SameScorers,
-    SameScores,
-    SameSet,
-    SameTask,
-    UneditedConfig,
-)
+from infthor_board.checks import replies, requests, runs
 from infthor_board.expected import Expected, Owner
 from infthor_board.reading import Problem, Submission, describe, read_submission
 from infthor_board.statement import find_submissions
 
-CHECKS: Sequence[Check] = (
-    CompleteIdentity(),
-    SameModel(),
-    UneditedConfig(),
-    SameSet(),
-    SameTask(),
-    AllThere(),
-    AskedOnce(),
-    NoneOfAnotherSet(),
-    SameScorers(),
-    SameScores(),
-    SameResults(),
-    SameRequests(),
-    CopiedRecords(),
-    CopiedReplies(),
-    KeyForm(),
-    KeySpelling(),
-    KeyWords(),
-    KeyScore(),
-    PairsOfWhatDiffers(),
-    PairsOfBothWorlds(),
-    PairsWithSingles(),
-    AboveBlind(),
-    AboveOtherHome(),
+CHECKS = (
+    runs.complete_identity,
+    runs.same_model,
+    runs.unedited_config,
+    runs.same_set,
+    runs.same_task,
+    runs.all_there,
+    runs.asked_once,
+    runs.none_of_another_set,
+    runs.same_scorers,
+    runs.same_scores,
+    runs.same_results,
+    requests.same_requests,
+    replies.copied_records,
+    replies.copied_replies,
+    replies.key_form,
+    replies.key_spelling,
+    replies.key_words,
+    replies.key_score,
+    replies.pairs_of_what_differs,
+    replies.pairs_of_both_worlds,
+    replies.pairs_with_singles,
+    replies.not_above_blind,
+    replies.not_above_other_home,
 )
 
 
@@ -104,7 +78,7 @@ def check_submissions(
         rivals = [it for it in cases if it is not case] + earlier
         problems = [*case.submission.problems]
         for check in CHECKS:
-            problems += _problems(check, case, rivals)
+            problems += _problems(check, replace(case, others=rivals))
         verdicts.append(Verdict(case, [_allow(problem, allowed) for problem in problems]))
     return verdicts
 
@@ -131,10 +105,10 @@ def _open(folder: Path, owner: Owner) -> Case:
     return Case(known, tasks)
 
 
-def _problems(check: Check, case: Case, others: Sequence[Case]) -> Iterator[Problem]:
+def _problems(check: Check, case: Case) -> Iterator[Problem]:
     """Yield the problems of a check; one that cannot be made refuses, and stops no other."""
     try:
-        yield from check.problems(case, others)
+        yield from check.problems(case)
     except Exception as error:  # noqa: BLE001 - see `describe`
         yield Problem(check.name, f"cannot be checked: {describe(error)}")
 

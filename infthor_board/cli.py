@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import infthor_eval
-from infthor_eval.cli.help import ExampleCommand
 from infthor_eval.cli.main import Program, run_program
-from infthor_eval.cli.options.values import PATH, split_names
+from infthor_eval.cli.options.values import PATH, default_option, split_names
 from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
+from infthor_eval.cli.progress.notes import NOTES, print_failure, print_note
+from infthor_eval.storage.files import hold_folder, prepare_file
+from infthor_eval.terminal import print_line, progress_bar
 
 if TYPE_CHECKING:
     from infthor_board.checking import Verdict
@@ -62,7 +64,7 @@ def _checking_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return command
 
 
-@_infthor_board.command("check", cls=ExampleCommand, example="infthor-board check my_submission")
+@_infthor_board.command("check", example="infthor-board check my_submission")
 @click.argument("folder", type=PATH)
 @click.option(
     "--others",
@@ -89,8 +91,6 @@ def check(
     """
     import msgspec
 
-    from infthor_eval.terminal import print_line
-
     verdicts = _check(folder, sets, key, allow, include, others)
     for verdict in verdicts:
         lines = [msgspec.json.encode(_document(verdict)).decode()] if as_json else _lines(verdict)
@@ -99,11 +99,7 @@ def check(
     return int(any(verdict.refusals for verdict in verdicts))
 
 
-@_infthor_board.command(
-    "page",
-    cls=ExampleCommand,
-    example="infthor-board page submissions --out leaderboard.html",
-)
+@_infthor_board.command("page", example="infthor-board page submissions --out leaderboard.html")
 @click.argument("folder", type=PATH)
 @click.option("--out", type=PATH, required=True, metavar="FILE.html", help="The page.")
 @click.option("--title", default=_TITLE, show_default=True, help="Title of the page.")
@@ -126,8 +122,6 @@ def page(
     """
     from infthor_board.page import write_leaderboard
     from infthor_board.rows import published_rows, rows_of
-    from infthor_eval.cli.progress.notes import print_failure, print_note
-    from infthor_eval.storage.files import prepare_file
 
     prepare_file(out)
     verdicts = _check(folder, sets, key, allow, include)
@@ -152,9 +146,7 @@ def page(
 
 
 @_infthor_board.command(
-    "private-set",
-    cls=ExampleCommand,
-    example="infthor-board private-set --seed-file secret.txt --out held_out",
+    "private-set", example="infthor-board private-set --seed-file secret.txt --out held_out"
 )
 @click.option(
     "--seed-file",
@@ -164,23 +156,11 @@ def page(
     help="The secret: 32 hexadecimal digits or more (openssl rand -hex 32).",
 )
 @click.option("--out", type=PATH, required=True, metavar="DIR", help="Folder of both parts.")
-@click.option(
-    "--homes", type=click.IntRange(1), default=12, show_default=True, help="A trajectory in each."
-)
+@default_option("--homes", click.IntRange(1), 12, "A trajectory in each.")
 @click.option("--kinds", metavar="KIND,...", help="Kinds of edits, with commas; default: all.")
-@click.option(
-    "--min-steps",
-    type=click.IntRange(1),
-    default=300,
-    show_default=True,
-    help="Steps of each trajectory, at least.",
-)
-@click.option(
-    "--per-trajectory",
-    type=click.IntRange(1),
-    default=25,
-    show_default=True,
-    help="Paired questions of one trajectory, at most.",
+@default_option("--min-steps", click.IntRange(1), 300, "Steps of each trajectory, at least.")
+@default_option(
+    "--per-trajectory", click.IntRange(1), 25, "Paired questions of one trajectory, at most."
 )
 @worker_options
 def private_set(
@@ -201,9 +181,6 @@ def private_set(
     from infthor_board.private_sets import make_private_set, read_secret
     from infthor_eval.cli.commands.data.questions import parse_kinds
     from infthor_eval.cli.progress.bar import PacedBar
-    from infthor_eval.cli.progress.notes import NOTES, print_failure, print_note
-    from infthor_eval.storage.files import hold_folder
-    from infthor_eval.terminal import print_line, progress_bar
 
     secret = read_secret(seed_file)
     worker_settings = parse_worker_settings(**workers)

@@ -8,13 +8,7 @@ from msgspec.structs import replace
 
 from infthor_board.exports import ExportedScores, read_exported_scores
 from infthor_board.statement import Statement, read_statement
-from infthor_eval.errors import (
-    DataError,
-    InfthorError,
-    UsageError,
-    describe_exception,
-    wrap_errors,
-)
+from infthor_eval.errors import DataError, InfthorError, UsageError, describe_exception, wrap_errors
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.nieh.config import NiehConfig
 from infthor_eval.nieh.published.imported_replies import ImportedRun, import_logs

@@ -40,7 +40,7 @@ class PluginTable:
 
     def load(self, name: str, protocol: type) -> Any:
         """Import the class of a name; one of another package must have the members of the
-        protocol."""
+        protocol, or of the base class."""
         if name in self.built_in:  # first: no package can change what a built-in name means
             return import_target(self.built_in[name])
         point = self.entry_points().get(name)
@@ -56,11 +56,9 @@ class PluginTable:
             raise
         except BaseException as error:  # its module is anybody's code
             raise UsageError(f"{problem} ({describe_exception(error)}); {hint}") from error
-        members = [
-            *protocol.__annotations__,
-            *(member for member in vars(protocol) if not member.startswith("_")),
-        ]
-        missing = [member for member in members if not hasattr(loaded, member)]
+        members = (*protocol.__annotations__, *vars(protocol))
+        public = dict.fromkeys(member for member in members if not member.startswith("_"))
+        missing = [member for member in public if not hasattr(loaded, member)]
         if missing:
             raise UsageError(
                 f"the {self.kind} {name} of another package lacks {', '.join(missing)}; see "

@@ -36,7 +36,7 @@ from infthor_eval.suites import find_presenter, find_suite
 
 if TYPE_CHECKING:
     from infthor_eval.rates import Rate
-    from infthor_eval.report.presenter import Presenter
+    from infthor_eval.report.plain import PlainPresenter
     from infthor_eval.runs.suite import Suite
 
 _INCOMPLETE = " (incomplete)"  # ends the name of a run that is not whole
@@ -110,12 +110,6 @@ class Run:
         other.__dict__.pop("header", None)
         return other
 
-    def with_records(self, records: Sequence[UnitRecord[Any]]) -> Self:
-        """Return the run, by the name and the marks that it has, with some of its records alone."""
-        other = copy(self.read())
-        other.records = tuple(records)
-        return other
-
     def read(self) -> Self:
         """Read the records now, so that what cannot be read is refused before any work."""
         _ = self.header  # which tells whether all units have a record
@@ -127,7 +121,7 @@ class Run:
         return find_suite(self.listed.suite)
 
     @cached_property
-    def presenter(self) -> Presenter:
+    def presenter(self) -> PlainPresenter:
         """The presenter of its suite."""
         return find_presenter(self.listed.suite)
 

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from infthor_eval.plans.evaluation import PlanUnit
     from infthor_eval.plans.records import PlanRecord
     from infthor_eval.plans.suite import PlansSuite
-    from infthor_eval.report.presenter import Presenter
+    from infthor_eval.report.plain import PlainPresenter
     from infthor_eval.runs import Suite, TaskFile
 
     # mypy holds the built-in suites to the protocol here: `find_suite`, which imports them by name,
@@ -108,12 +108,12 @@ def find_suite(name: str) -> "Suite[Any, Any]":
     return suite() if isinstance(suite, type) else suite
 
 
-def find_presenter(name: str) -> "Presenter":
+def find_presenter(name: str) -> "PlainPresenter":
     """Return the presenter of a suite."""
-    if name in _PRESENTERS.names:
-        from infthor_eval.report.presenter import Presenter
+    from infthor_eval.report.plain import PlainPresenter
 
-        return _PRESENTERS.load(name, Presenter)()
+    if name in _PRESENTERS.names:
+        return _PRESENTERS.load(name, PlainPresenter)()
 
     from infthor_eval.questions import QuestionSuite
 
@@ -121,8 +121,6 @@ def find_presenter(name: str) -> "Presenter":
         from infthor_eval.report.suites.questions import QuestionsPresenter
 
         return QuestionsPresenter()
-
-    from infthor_eval.report.plain import PlainPresenter
 
     return PlainPresenter()
 

@@ -30,12 +30,7 @@ from model_adapters.protocols import (
     Subject,
     Turn,
 )
-from model_adapters.refusals import (
-    check_decoding,
-    check_turns,
-    refuse_batches,
-    wrap_request_errors,
-)
+from model_adapters.refusals import check_decoding, check_turns, refuse_batches, wrap_request_errors
 from model_adapters.registry import (
     adapter_identity,
     check_options,

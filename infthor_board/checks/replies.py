@@ -6,16 +6,14 @@ The last two are warnings: who is no better than `blind` is not thereby dishones
 
 import ast
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from functools import lru_cache
 from itertools import pairwise
-from typing import ClassVar
 
 import scipy.stats
 
-from infthor_board.case import Case
+from infthor_board.case import Case, Reasons, Remark, check
 from infthor_board.expected import Expected
-from infthor_board.reading import Problem
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.nieh.guessing.blind import questions_by_file, sample_on_clues
 from infthor_eval.nieh.guessing.guessers import GUESSERS
@@ -62,67 +60,56 @@ _PAIRS = 0.05
 _LEAST_PAIRS = 30
 
 
-class CopiedRecords:
-    """Two submissions have no durations in common, to a tenth of a millisecond."""
-
-    name: ClassVar[str] = "records"
-    reason: ClassVar[str] = "a journal that was copied keeps the times of its requests"
-
-    def problems(self, case: Case, others: Sequence[Case]) -> Iterator[Problem]:
-        """See `Check`."""
-        for task, other, theirs in _shared(case, others):
-            equal = {
-                record.seconds
-                for record in task.records
-                if record.seconds >= _LEAST_S
-                and (same := theirs.get(record.key)) is not None
-                and same.seconds == record.seconds
-            }
-            if len(equal) >= _EQUAL_TIMES:
-                yield Problem(
-                    self.name,
-                    f"{task.name}: {len(equal):,} requests took exactly as long as in "
-                    f"{other.submission.name}; its records were copied",
-                )
+@check("records")
+def copied_records(case: Case) -> Iterator[str]:
+    """Two submissions have no durations in common, to a tenth of a millisecond: a journal that was
+    copied keeps the times of its requests."""
+    for task, other, theirs in _shared(case):
+        equal = {
+            record.seconds
+            for record in task.records
+            if record.seconds >= _LEAST_S
+            and (same := theirs.get(record.key)) is not None
+            and same.seconds == record.seconds
+        }
+        if len(equal) >= _EQUAL_TIMES:
+            yield (
+                f"{task.name}: {len(equal):,} requests took exactly as long as in "
+                f"{other.submission.name}; its records were copied"
+            )
 
 
-class CopiedReplies:
-    """Two models do not err alike, where no guess explains it.
+@check("copied")
+def copied_replies(case: Case) -> Iterator[str]:
+    """Two models do not err alike, where no guess explains it: models agree on what is right; they
+    do not agree on what is wrong.
 
     Compared are wrong answers to open questions of both, of which the other's is none that a
     guesser gives. Two submissions of one model and revision may agree.
     """
-
-    name: ClassVar[str] = "copied"
-    reason: ClassVar[str] = "models agree on what is right; they do not agree on what is wrong"
-
-    def problems(self, case: Case, others: Sequence[Case]) -> Iterator[Problem]:
-        """See `Check`."""
-        for task, other, theirs in _shared(case, others):
-            if _is_same_model(case, other):
-                continue
-            if _are_identical(task, theirs):
-                yield Problem(
-                    self.name,
-                    f"{task.name}: every reply is, letter by letter, that of "
-                    f"{other.submission.name}; its replies were copied",
-                )
-                continue
-            compared = [
-                (_said(record), _said(same))
-                for record in task.graded
-                if (same := theirs.get(record.key)) is not None
-                and _errs(record)
-                and _errs(same)
-                and _said(same) not in _guesses(task.data).get(record.id, ())
-            ]
-            equal = sum(ours == same for ours, same in compared)
-            if len(compared) >= _LEAST and equal >= _MOST * len(compared):
-                yield Problem(
-                    self.name,
-                    f"{task.name}: of {len(compared):,} wrong answers that nobody guesses, "
-                    f"{equal:,} are those of {other.submission.name}; its replies were copied",
-                )
+    for task, other, theirs in _shared(case):
+        if _is_same_model(case, other):
+            continue
+        if _are_identical(task, theirs):
+            yield (
+                f"{task.name}: every reply is, letter by letter, that of "
+                f"{other.submission.name}; its replies were copied"
+            )
+            continue
+        compared = [
+            (_said(record), _said(same))
+            for record in task.graded
+            if (same := theirs.get(record.key)) is not None
+            and _errs(record)
+            and _errs(same)
+            and _said(same) not in _guesses(task.data).get(record.id, ())
+        ]
+        equal = sum(ours == same for ours, same in compared)
+        if len(compared) >= _LEAST and equal >= _MOST * len(compared):
+            yield (
+                f"{task.name}: of {len(compared):,} wrong answers that nobody guesses, "
+                f"{equal:,} are those of {other.submission.name}; its replies were copied"
+            )
 
 
 def _are_identical(task: Expected, theirs: Mapping[UnitKey, Record]) -> bool:
@@ -133,11 +120,9 @@ def _are_identical(task: Expected, theirs: Mapping[UnitKey, Record]) -> bool:
     return enough and replies == of_other
 
 
-def _shared(
-    case: Case, others: Sequence[Case]
-) -> Iterator[tuple[Expected, Case, Mapping[UnitKey, Record]]]:
+def _shared(case: Case) -> Iterator[tuple[Expected, Case, Mapping[UnitKey, Record]]]:
     """Yield each task that another, no later submission has, too, with its records there."""
-    for other in others:
+    for other in case.others:
         if _is_later(other, case):
             continue
         for task in case.tasks:
@@ -185,80 +170,58 @@ def _guesses(data: NiehSet) -> Mapping[str, frozenset[str]]:
     return {name: frozenset(replies) for name, replies in found.items()}
 
 
-class KeyForm:
-    """No reply is a list as the question file has it."""
-
-    name: ClassVar[str] = "key form"
-    reason: ClassVar[str] = "no model answers ['mug', 'plate']"
-
-    def problems(self, case: Case, others: Sequence[Case]) -> Iterator[Problem]:
-        """See `Check`."""
-        for task in case.shown:
-            n_lists = sum(_is_cell(record) for record in task.graded)
-            if n_lists >= _LISTS:
-                yield Problem(
-                    self.name,
-                    f"{task.name}: {n_lists:,} replies are the cell of the question file, brackets "
-                    "and quotes included; they were copied from the key",
-                )
+@check("key form")
+def key_form(case: Case) -> Iterator[str]:
+    """No reply is a list as the question file has it: no model answers ['mug', 'plate']."""
+    for task in case.shown:
+        n_lists = sum(_is_cell(record) for record in task.graded)
+        if n_lists >= _LISTS:
+            yield (
+                f"{task.name}: {n_lists:,} replies are the cell of the question file, brackets "
+                "and quotes included; they were copied from the key"
+            )
 
 
-class KeySpelling:
-    """Words in the key's own spelling are sometimes wrong, as all words of a model are."""
-
-    name: ClassVar[str] = "key spelling"
-    reason: ClassVar[str] = "questions say tennis racket and the key tennisracket"
-
-    def problems(self, case: Case, others: Sequence[Case]) -> Iterator[Problem]:
-        """See `Check`."""
-        for task in case.shown:
-            joined = _joined_words(task)
-            said = [it for it in task.graded if joined & set(_words(it.payload.reply or ""))]
-            right = sum(it.payload.scores.get("strict", 0.0) >= 1 for it in said)
-            if len(said) >= _JOINED and right >= _RIGHT * len(said):
-                yield Problem(
-                    self.name,
-                    f"{task.name}: {len(said):,} replies are spelled as the key alone spells, and "
-                    f"{right:,} of them are right; they were copied from the key",
-                )
+@check("key spelling")
+def key_spelling(case: Case) -> Iterator[str]:
+    """Words in the key's own spelling are sometimes wrong, as all words of a model are: questions
+    say tennis racket and the key tennisracket."""
+    for task in case.shown:
+        joined = _joined_words(task)
+        said = [it for it in task.graded if joined & set(_words(it.payload.reply or ""))]
+        right = sum(it.payload.scores.get("strict", 0.0) >= 1 for it in said)
+        if len(said) >= _JOINED and right >= _RIGHT * len(said):
+            yield (
+                f"{task.name}: {len(said):,} replies are spelled as the key alone spells, and "
+                f"{right:,} of them are right; they were copied from the key"
+            )
 
 
-class KeyWords:
-    """Open questions are not answered in the key's words, letter by letter."""
-
-    name: ClassVar[str] = "key words"
-    reason: ClassVar[str] = "a model that is right says it in its own words, and is wrong at times"
-
-    def problems(self, case: Case, others: Sequence[Case]) -> Iterator[Problem]:
-        """See `Check`."""
-        for task in case.shown:
-            replied = [it for it in task.graded if is_open_ended(it)]
-            verbatim = sum(_is_verbatim(record) for record in replied)
-            if len(replied) >= _OPEN and verbatim >= _VERBATIM * len(replied):
-                yield Problem(
-                    self.name,
-                    f"{task.name}: {verbatim:,} of {len(replied):,} open questions are answered "
-                    "in the key's words to the letter; they were copied from the key",
-                )
+@check("key words")
+def key_words(case: Case) -> Iterator[str]:
+    """Open questions are not answered in the key's words, letter by letter: a model that is right
+    says it in its own words, and is wrong at times."""
+    for task in case.shown:
+        replied = [it for it in task.graded if is_open_ended(it)]
+        verbatim = sum(_is_verbatim(record) for record in replied)
+        if len(replied) >= _OPEN and verbatim >= _VERBATIM * len(replied):
+            yield (
+                f"{task.name}: {verbatim:,} of {len(replied):,} open questions are answered "
+                "in the key's words to the letter; they were copied from the key"
+            )
 
 
-class KeyScore:
-    """Not all is right."""
-
-    name: ClassVar[str] = "key score"
-    reason: ClassVar[str] = "a reworded key is right about things that no frame shows"
-
-    def problems(self, case: Case, others: Sequence[Case]) -> Iterator[Problem]:
-        """See `Check`."""
-        for task in case.shown:
-            records = task.graded
-            right = sum(it.payload.scores.get("strict", 0.0) >= 1 for it in records)
-            if len(records) >= _MANY_QUESTIONS and right >= _ALL_RIGHT * len(records):
-                yield Problem(
-                    self.name,
-                    f"{task.name}: {right:,} of {len(records):,} answers are right, as only the "
-                    "key is; look at its replies before you allow it",
-                )
+@check("key score")
+def key_score(case: Case) -> Iterator[str]:
+    """Not all is right: a reworded key is right about things that no frame shows."""
+    for task in case.shown:
+        records = task.graded
+        right = sum(it.payload.scores.get("strict", 0.0) >= 1 for it in records)
+        if len(records) >= _MANY_QUESTIONS and right >= _ALL_RIGHT * len(records):
+            yield (
+                f"{task.name}: {right:,} of {len(records):,} answers are right, as only the "
+                "key is; look at its replies before you allow it"
+            )
 
 
 def _is_cell(record: Record) -> bool:
@@ -297,75 +260,58 @@ def _words(text: str) -> list[str]:
     return re.findall(r"[a-z]+", text.lower())
 
 
-class PairsOfWhatDiffers:
-    """Where both worlds were shown the same frames, greedy replies are the same."""
-
-    name: ClassVar[str] = "pairs alike"
-    reason: ClassVar[str] = "one request has one greedy reply: another one came from elsewhere"
-
-    def problems(self, case: Case, others: Sequence[Case]) -> Iterator[Problem]:
-        """See `Check`."""
-        for task in case.tasks:
-            if task.run.is_export or not _is_greedy(task):
-                continue
-            alike = [pair for pair in find_pairs(task.graded)[0] if _is_alike(pair)]
-            flipped = sum(is_flipped(*pair) for pair in alike)
-            if flipped >= _SAME and flipped > _SAME_SHARE * len(alike):
-                yield Problem(
-                    self.name,
-                    f"{task.name}: of {len(alike):,} pairs whose frames are the same in both "
-                    f"worlds, {flipped:,} have two replies; nothing that was shown tells them "
-                    "apart",
-                )
-
-
-class PairsOfBothWorlds:
-    """Right answers in one world alone are as many in either world: a coin drew their order."""
-
-    name: ClassVar[str] = "pairs one-sided"
-    reason: ClassVar[str] = "the key of one world, given in both"
-
-    def problems(self, case: Case, others: Sequence[Case]) -> Iterator[Problem]:
-        """See `Check`."""
-        for task in case.shown:
-            sides = [
-                _is_first_right(task, pair)
-                for pair in find_pairs(task.graded)[0]
-                if sum(is_right(side, "strict") for side in pair) == 1
-            ]
-            if sides and scipy.stats.binomtest(sum(sides), len(sides)).pvalue < _CHANCE:
-                yield Problem(
-                    self.name,
-                    f"{task.name}: of {len(sides):,} pairs with one right answer, {sum(sides):,} "
-                    "are right in the first world; a coin drew which is first",
-                )
-
-
-class PairsWithSingles:
-    """Who answers nearly all single questions from the frames tells some worlds apart."""
-
-    name: ClassVar[str] = "pairs and singles"
-    reason: ClassVar[str] = (
-        "four of five answers read off the frames, and no world told from its twin"
-    )
-
-    def problems(self, case: Case, others: Sequence[Case]) -> Iterator[Problem]:
-        """See `Check`."""
-        for plain, twins in _together(case):
-            singles = clustered_rate(
-                [it.payload.scores.get("strict", 0.0) for it in plain.graded],
-                [it.cluster for it in plain.graded],
+@check("pairs alike")
+def pairs_of_what_differs(case: Case) -> Iterator[str]:
+    """Where both worlds were shown the same frames, greedy replies are the same: one request has
+    one greedy reply: another one came from elsewhere."""
+    for task in case.tasks:
+        if task.run.is_export or not _is_greedy(task):
+            continue
+        alike = [pair for pair in find_pairs(task.graded)[0] if _is_alike(pair)]
+        flipped = sum(is_flipped(*pair) for pair in alike)
+        if flipped >= _SAME and flipped > _SAME_SHARE * len(alike):
+            yield (
+                f"{task.name}: of {len(alike):,} pairs whose frames are the same in both "
+                f"worlds, {flipped:,} have two replies; nothing that was shown tells them "
+                "apart"
             )
-            pairs = summarise_pairs(twins.graded, "strict")
-            if singles is None or pairs is None or pairs.n_pairs < _LEAST_PAIRS:
-                continue
-            if singles.mean >= _SINGLES and pairs.net_pairs.mean < _PAIRS:
-                yield Problem(
-                    self.name,
-                    f"{plain.name}: {100 * singles.mean:.1f} % of single answers, and "
-                    f"{100 * pairs.net_pairs.mean:.1f} % net pairs of {twins.name}, in the same "
-                    "context; one of the two was not answered from frames",
-                )
+
+
+@check("pairs one-sided")
+def pairs_of_both_worlds(case: Case) -> Iterator[str]:
+    """Right answers in one world alone are as many in either world: a coin drew their order: the
+    key of one world, given in both."""
+    for task in case.shown:
+        sides = [
+            _is_first_right(task, pair)
+            for pair in find_pairs(task.graded)[0]
+            if sum(is_right(side, "strict") for side in pair) == 1
+        ]
+        if sides and scipy.stats.binomtest(sum(sides), len(sides)).pvalue < _CHANCE:
+            yield (
+                f"{task.name}: of {len(sides):,} pairs with one right answer, {sum(sides):,} "
+                "are right in the first world; a coin drew which is first"
+            )
+
+
+@check("pairs and singles")
+def pairs_with_singles(case: Case) -> Iterator[str]:
+    """Who answers nearly all single questions from the frames tells some worlds apart: four of five
+    answers read off the frames, and no world told from its twin."""
+    for plain, twins in _together(case):
+        singles = clustered_rate(
+            [it.payload.scores.get("strict", 0.0) for it in plain.graded],
+            [it.cluster for it in plain.graded],
+        )
+        pairs = summarise_pairs(twins.graded, "strict")
+        if singles is None or pairs is None or pairs.n_pairs < _LEAST_PAIRS:
+            continue
+        if singles.mean >= _SINGLES and pairs.net_pairs.mean < _PAIRS:
+            yield (
+                f"{plain.name}: {100 * singles.mean:.1f} % of single answers, and "
+                f"{100 * pairs.net_pairs.mean:.1f} % net pairs of {twins.name}, in the same "
+                "context; one of the two was not answered from frames"
+            )
 
 
 def _together(case: Case) -> Iterator[tuple[Expected, Expected]]:
@@ -398,56 +344,44 @@ def _is_first_right(task: Expected, pair: TwinRecords) -> bool:
     return right.twin.traj_id == worlds[0]
 
 
-class AboveBlind:
-    """The score is above that of `blind`, which sees no frame."""
-
-    name: ClassVar[str] = "above blind"
-    reason: ClassVar[str] = "a score that is had without a frame shows no memory"
-
-    def problems(self, case: Case, others: Sequence[Case]) -> Iterator[Problem]:
-        """See `Check`."""
-        for task in case.shown:
-            if not self.is_above(task):
-                yield Problem(
-                    self.name,
-                    f"{task.name}: is not above blind, which sees no frame",
-                    is_warning=True,
-                )
-
-    @staticmethod
-    def is_above(task: Expected) -> bool:
-        """Return True if the whole interval of the score above blind is above 0."""
-        of_task = above_blind(task.graded, "strict")
-        return of_task.low is not None and of_task.low > 0
+@check("above blind")
+def not_above_blind(case: Case) -> Reasons:
+    """The score is above that of `blind`, which sees no frame: a score that is had without a frame
+    shows no memory."""
+    for task in case.shown:
+        if not _is_above_blind(task):
+            yield Remark(f"{task.name}: is not above blind, which sees no frame")
 
 
-class AboveOtherHome:
-    """The score is above that on another home of the same kind."""
+def _is_above_blind(task: Expected) -> bool:
+    """Return True if the whole interval of the score above blind is above 0."""
+    of_task = above_blind(task.graded, "strict")
+    return of_task.low is not None and of_task.low > 0
 
-    name: ClassVar[str] = "above other home"
-    reason: ClassVar[str] = "knowledge of homes looks like memory of this one"
 
-    def problems(self, case: Case, others: Sequence[Case]) -> Iterator[Problem]:
-        """See `Check`."""
-        controls = {task.name: task for task in case.controls(OTHER)}
-        for task in case.shown:
-            control = controls.get(task.name)
-            if control is None:
-                text = f"{task.name}: no run on another home; send one (--frames {OTHER})"
-                yield Problem(self.name, text, is_warning=True)
-            elif not self._is_above(task, control):
-                text = f"{task.name}: is not above the same model's score on another home"
-                yield Problem(self.name, text, is_warning=True)
+@check("above other home")
+def not_above_other_home(case: Case) -> Reasons:
+    """The score is above that on another home of the same kind: knowledge of homes looks like
+    memory of this one."""
+    controls = {task.name: task for task in case.controls(OTHER)}
+    for task in case.shown:
+        control = controls.get(task.name)
+        if control is None:
+            text = f"{task.name}: no run on another home; send one (--frames {OTHER})"
+            yield Remark(text)
+        elif not _is_above_control(task, control):
+            text = f"{task.name}: is not above the same model's score on another home"
+            yield Remark(text)
 
-    @staticmethod
-    def _is_above(task: Expected, control: Expected) -> bool:
-        theirs = {it.key: it.payload.scores.get("strict", 0.0) for it in control.graded}
-        shared = [it for it in task.graded if it.key in theirs]
-        difference = paired_difference(
-            [theirs[it.key] for it in shared],
-            [it.payload.scores.get("strict", 0.0) for it in shared],
-            [it.cluster for it in shared],
-            most=1.0,
-        )
-        low = difference.estimate.low
-        return low is not None and low > 0
+
+def _is_above_control(task: Expected, control: Expected) -> bool:
+    theirs = {it.key: it.payload.scores.get("strict", 0.0) for it in control.graded}
+    shared = [it for it in task.graded if it.key in theirs]
+    difference = paired_difference(
+        [theirs[it.key] for it in shared],
+        [it.payload.scores.get("strict", 0.0) for it in shared],
+        [it.cluster for it in shared],
+        most=1.0,
+    )
+    low = difference.estimate.low
+    return low is not None and low > 0

@@ -1,5 +1,6 @@
 """Commands whose help begins with an example, and has their options by what they are for."""
 
+from collections.abc import Callable
 from typing import Any
 
 import click
@@ -46,4 +47,11 @@ class ExampleCommand(_WithExample):
 
 
 class ExampleGroup(_WithExample, click.Group):
-    """A group of commands with an example."""
+    """A group of commands with an example, each of which has one, too."""
+
+    command_class = ExampleCommand
+
+
+def example_command(name: str, example: str) -> Callable[[Callable[..., Any]], ExampleCommand]:
+    """Return a decorator that makes a command whose help begins with an example."""
+    return click.command(name, cls=ExampleCommand, example=example)

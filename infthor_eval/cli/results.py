@@ -15,9 +15,7 @@ from infthor_eval.reasons import count_reasons
 from infthor_eval.report.exporting import export_tables
 from infthor_eval.report.terminal import print_table, table_console
 from infthor_eval.run import Run, with_distinct_names
-from infthor_eval.runs import (
-    UnitRecord,
-)
+from infthor_eval.runs import UnitRecord
 from infthor_eval.runs.results import results_document
 from infthor_eval.tables import Table
 from infthor_eval.terminal import print_line

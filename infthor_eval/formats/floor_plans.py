@@ -17,12 +17,7 @@ import numpy as np
 from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.reading import json_lines_of, read_json
 from infthor_eval.storage.digests import canonical_json, digest, digest_of_files
-from infthor_eval.storage.files import (
-    OVERWRITE_HINT,
-    file_name,
-    refuse_overwrite,
-    write_atomically,
-)
+from infthor_eval.storage.files import OVERWRITE_HINT, file_name, refuse_overwrite, write_atomically
 
 _OBJECTS = Path("thor_scenes") / "objects.jsonl.gz"
 _PARTS = ("rooms", "walls", "objects")

@@ -50,17 +50,14 @@ class ReplayForm(Protocol):
     @property
     def folder(self) -> str:
         """Folder of the trajectories' folders, in that of the set."""
-        ...
 
     @property
     def simulator_options(self) -> Mapping[str, Any]:
         """Options of the `Simulator` that renders it."""
-        ...
 
     @property
     def report_type(self) -> type[ReplayReport]:
         """Type of its reports (`replay.json`)."""
-        ...
 
     def write(
         self,
@@ -71,11 +68,9 @@ class ReplayForm(Protocol):
         on_progress: OnProgress = ignore_progress,
     ) -> ReplayReport:
         """Replay a trajectory into an existing, empty folder; see `replay`."""
-        ...
 
     def require_same(self, report: Any, folder: Path) -> None:
         """Raise DataError if the report in a folder, of `report_type`, has other settings."""
-        ...
 
 
 @dataclass(frozen=True)

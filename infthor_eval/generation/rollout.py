@@ -20,15 +20,12 @@ class Walking(Protocol):
 
     def go(self, object_ids: list[str], inside: str | None = None) -> None:
         """Walk to where objects can be acted on."""
-        ...
 
     def step_aside(self, item: str, inside: str | None = None) -> None:
         """Walk to where an object can be acted on, within the current sub-goal."""
-        ...
 
     def forget_grid(self) -> None:
         """Learn anew where the agent can stand."""
-        ...
 
 
 class Rollout:

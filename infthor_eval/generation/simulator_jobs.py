@@ -38,7 +38,6 @@ class _JobOutcome(Protocol):
     @property
     def is_resumed(self) -> bool:
         """True if the result is of an earlier run."""
-        ...
 
 
 T = TypeVar("T", bound=_JobOutcome)

@@ -18,14 +18,7 @@ from infthor_eval.runs.journals.record_encoder import RecordEncoder
 from infthor_eval.runs.work.binding import group_records, require_capability
 from infthor_eval.storage.scratch import ScratchFolder
 from infthor_eval.suites import baseline_suites, find_request_adapter, find_suite
-from model_adapters import (
-    adapter_identity,
-    has_option,
-    identity_of,
-    label,
-    load,
-    refuse_batches,
-)
+from model_adapters import adapter_identity, has_option, identity_of, label, load, refuse_batches
 
 _DEFAULT_DEVICE = "cuda:0"  # lm-eval's default
 

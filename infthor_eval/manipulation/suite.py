@@ -7,12 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import zip_longest
 from typing import ClassVar
 
-from infthor_eval.episodes.tables import (
-    NAME_COLUMNS,
-    endings_table,
-    named_tasks,
-    result_notes,
-)
+from infthor_eval.episodes.tables import NAME_COLUMNS, endings_table, named_tasks, result_notes
 from infthor_eval.formats.published import PUBLISHED_DATA, published_tables
 from infthor_eval.manipulation.actors import BASELINES
 from infthor_eval.manipulation.evaluation import ManipulationEvaluation
@@ -26,14 +21,7 @@ from infthor_eval.manipulation.summary import (
 )
 from infthor_eval.manipulation.task import check_task_file
 from infthor_eval.rates import Rate, format_percent, paired_rate
-from infthor_eval.runs import (
-    RecordTypes,
-    RunHeader,
-    RunSummary,
-    TaskFile,
-    TaskRequest,
-    UnitRecord,
-)
+from infthor_eval.runs import RecordTypes, RunHeader, RunSummary, TaskFile, TaskRequest, UnitRecord
 from infthor_eval.runs.config import require_tasks
 from infthor_eval.runs.suite import Need
 from infthor_eval.tables import Column, Row, Table

@@ -22,10 +22,9 @@ from infthor_eval.memory.protocol import (
     tokens_of,
 )
 from infthor_eval.storage.deadlines import limit_time
-from infthor_eval.storage.digests import json_values
 from infthor_eval.storage.limits import MEMORY_SECONDS
 from infthor_eval.storage.scratch import ScratchFolder
-from model_adapters.check.clauses import ContractError, require
+from model_adapters.check.clauses import check_identity_values, require
 from model_adapters.check.results import MEMBERS, CheckResult, run_each
 
 _STEPS = 24
@@ -43,7 +42,7 @@ def check_memory(memory: Memory) -> Iterator[CheckResult]:
     with ScratchFolder() as folder:
         checks: dict[str, Callable[[], None]] = {
             MEMBERS: partial(_check_members, memory),
-            "identity": partial(_check_identity, memory),
+            "identity": lambda: check_identity_values(memory.identity),
             "recalls": partial(_check_recalls, memory, folder),
             "empty": partial(_check_empty, memory, folder),
             "budget": partial(_check_budget, memory, folder),
@@ -66,16 +65,6 @@ def _check_members(memory: Any) -> None:
     require(
         isinstance(memory.capabilities, MemoryCapabilities), "capabilities is no MemoryCapabilities"
     )
-
-
-def _check_identity(memory: Memory) -> None:
-    identity = dict(memory.identity())
-    try:
-        again = json_values(identity, "identity()")
-    except ValueError as error:
-        raise ContractError(str(error)) from error
-    require(again == identity, "identity() changes when written as JSON and read back")
-    require(dict(memory.identity()) == identity, "identity() differs from call to call")
 
 
 def _check_recalls(memory: Memory, folder: Path) -> None:

@@ -16,13 +16,7 @@ from typing import Any, overload
 import msgspec
 from PIL import Image
 
-from infthor_eval.errors import (
-    ModelError,
-    UsageError,
-    UserCodeError,
-    in_one_line,
-    wrap_user_code,
-)
+from infthor_eval.errors import ModelError, UsageError, UserCodeError, in_one_line, wrap_user_code
 from infthor_eval.memory.protocol import (
     Memory,
     MemoryCapabilities,

@@ -9,7 +9,7 @@ from infthor_eval.formats.question import Question
 from infthor_eval.formats.question_forms import type_of
 from infthor_eval.nieh.config import NiehConfig
 from infthor_eval.quantities import Amount, Count, Number, Share, Whole
-from infthor_eval.runs.journals.records import RecordTypes
+from infthor_eval.runs.journals.records import RecordTypes, Typed
 
 _Answers = tuple[str | Whole | Number, ...]
 
@@ -106,14 +106,7 @@ class NiehRecall(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", ta
         return sum(isinstance(position, int) for position in self.recalled)
 
 
-class NiehAnswer(
-    msgspec.Struct,
-    frozen=True,
-    kw_only=True,
-    omit_defaults=True,
-    tag_field="type",
-    tag="nieh_answer",
-):
+class NiehAnswer(Typed, frozen=True, kw_only=True, tag="nieh_answer"):
     """A question and the reply to it.
 
     Attributes:
@@ -152,7 +145,7 @@ class NiehAnswer(
     twin: TwinSide | None = None
     recall: NiehRecall | None = None
     reply: str | None = None
-    scores: dict[str, Number] = {}
+    scores: dict[str, Number] = msgspec.field(default_factory=dict)
     thinking: str | None = None
     n_watched: Count | None = None
     reply_ids: tuple[Count, ...] = ()

@@ -6,7 +6,7 @@ clause raises an error of one line.
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -15,7 +15,7 @@ from infthor_eval.formats.object_ids import object_type_of
 from infthor_eval.plans.environment import Ended, Observation, StepOutcome
 from infthor_eval.plans.expert import ExpertAction, ExpertRefusedError
 from infthor_eval.plans.plan import Plan
-from model_adapters import ContractError
+from model_adapters.check.clauses import raises, require
 
 _ID = re.compile(r"[A-Za-z]+\|[^|]+\|[^|]+\|[^|]+(\|\w+)*")  # type, position, part
 _NONSENSE = ("", "fly to the moon", "MoveAhead Mug", "PutObject Mug", "pickupobject Mug")
@@ -55,8 +55,8 @@ def check_env(environment: Environment, plans: Sequence[int] | None = None) -> N
     _check_plans(environment.plans)
     _check_nothing_under_way(environment, "before the first reset()")
     chosen = range(min(_PLANS, len(environment.plans))) if plans is None else plans
-    possible = [plan for plan in chosen if not _raises(ExpertRefusedError, environment.reset, plan)]
-    _require(bool(possible), "none of the plans can be reset to")
+    possible = [plan for plan in chosen if not raises(ExpertRefusedError, environment.reset, plan)]
+    require(bool(possible), "none of the plans can be reset to")
     for plan in possible:
         _check_reset(environment, plan)
         _check_expert(environment, plan)
@@ -64,55 +64,41 @@ def check_env(environment: Environment, plans: Sequence[int] | None = None) -> N
     _check_nonsense(environment, possible[0])
     _check_limit(environment, possible[0])
     for plan in (-1, len(environment.plans)):
-        _require(
-            _raises(IndexError, environment.reset, plan),
+        require(
+            raises(IndexError, environment.reset, plan),
             f"reset({plan}) does not raise IndexError: no such plan",
         )
 
 
-def _require(holds: bool, clause: str) -> None:
-    if not holds:
-        raise ContractError(clause)
-
-
-def _raises(error_type: type[Exception], call: Callable[..., Any], *args: Any) -> bool:
-    try:
-        call(*args)
-    except error_type:
-        return True
-    return False
-
-
 def _check_plans(plans: Sequence[Plan]) -> None:
-    _require(bool(plans), "there is no plan")
-    _require(
+    require(bool(plans), "there is no plan")
+    require(
         [plan.index for plan in plans] == list(range(len(plans))),
         "plans are not numbered in their order",
     )
 
 
 def _check_nothing_under_way(environment: Environment, when: str) -> None:
-    _require(
-        _raises(RuntimeError, environment.step, "NoOp"),
-        f"step() {when} does not raise RuntimeError",
+    require(
+        raises(RuntimeError, environment.step, "NoOp"), f"step() {when} does not raise RuntimeError"
     )
 
 
 def _check_reset(environment: Environment, plan: int) -> None:
     result = environment.reset(plan)
-    _require(
+    require(
         isinstance(result, tuple) and len(result) == 2,
         "reset() does not give an observation and information",
     )
     observation, info = result
-    _require(
+    require(
         {"max_reward", "n_expert"} <= set(info),
         "the information of reset() lacks max_reward or n_expert",
     )
     most = info["max_reward"]
-    _require(math.isfinite(most) and most >= 0, f"max_reward of plan {plan} is {most}")
+    require(math.isfinite(most) and most >= 0, f"max_reward of plan {plan} is {most}")
     n_expert = len(environment.expert_actions(plan))
-    _require(
+    require(
         info["n_expert"] == n_expert > 0,
         f"n_expert of plan {plan} is {info['n_expert']}, of {n_expert} actions",
     )
@@ -132,9 +118,9 @@ def _check_expert(environment: Environment, plan: int) -> None:
         if over:
             break
     done = over and outcome.info.ended == Ended.DONE
-    _require(done, f"the expert's actions do not complete plan {plan}: {outcome.info}")
+    require(done, f"the expert's actions do not complete plan {plan}: {outcome.info}")
     most = info["max_reward"]
-    _require(
+    require(
         abs(earned - most) < _SMALL,
         f"the expert earns {earned:g} in plan {plan}, and max_reward says {most:g}",
     )
@@ -148,12 +134,12 @@ def _check_state_is_the_plans_own(environment: Environment, plans: Sequence[int]
         observation, info = environment.reset(plan)
         before, before_info = first[plan]
         is_same = _state(observation) == _state(before)
-        _require(is_same, f"plan {plan} begins in another state the second time")
-        _require(
+        require(is_same, f"plan {plan} begins in another state the second time")
+        require(
             _same_picture(observation, before),
             f"plan {plan} begins with another picture the second time",
         )
-        _require(
+        require(
             dict(info) == dict(before_info),
             f"the information of reset({plan}) differs the second time",
         )
@@ -168,15 +154,15 @@ def _check_nonsense(environment: Environment, plan: int) -> None:
         environment.reset(plan)
         outcome = environment.step(text)
         _check_outcome(outcome)
-        _require(outcome.terminated, f"{text!r}, which is no action, does not terminate the plan")
-        _require(outcome.reward == 0, f"{text!r}, which is no action, earns {outcome.reward}")
+        require(outcome.terminated, f"{text!r}, which is no action, does not terminate the plan")
+        require(outcome.reward == 0, f"{text!r}, which is no action, earns {outcome.reward}")
         expected = Ended.UNKNOWN_OBJECT if text == _UNKNOWN else Ended.NO_ACTION
-        _require(
+        require(
             outcome.info.ended == expected,
             f"{text!r} ends the plan with {outcome.info.ended}, not {expected}",
         )
-        _require(outcome.info.call is None, f"{text!r}, which is no action, has a call")
-        _require(bool(outcome.info.message), f"{text!r}, which is no action, has no message")
+        require(outcome.info.call is None, f"{text!r}, which is no action, has a call")
+        require(bool(outcome.info.message), f"{text!r}, which is no action, has no message")
         _check_nothing_under_way(environment, "after what is no action")
 
 
@@ -188,22 +174,22 @@ def _check_limit(environment: Environment, plan: int) -> None:
         _check_outcome(outcome)
         if outcome.terminated or outcome.truncated:
             break
-    _require(outcome.truncated, "a plan in which nothing is done is not truncated")
+    require(outcome.truncated, "a plan in which nothing is done is not truncated")
     _check_nothing_under_way(environment, "after the limit of steps")
 
 
 def _check_outcome(outcome: StepOutcome) -> None:
-    _require(isinstance(outcome, tuple) and len(outcome) == 5, "step() does not give five values")
+    require(isinstance(outcome, tuple) and len(outcome) == 5, "step() does not give five values")
     observation, reward, terminated, truncated, info = outcome
-    _require(
+    require(
         isinstance(terminated, bool) and isinstance(truncated, bool),
         "terminated and truncated are no booleans",
     )
-    _require(not (terminated and truncated), "a plan is terminated and truncated at once")
-    _require(isinstance(reward, int | float) and math.isfinite(reward), f"a reward is {reward!r}")
+    require(not (terminated and truncated), "a plan is terminated and truncated at once")
+    require(isinstance(reward, int | float) and math.isfinite(reward), f"a reward is {reward!r}")
     goes_on = not terminated and not truncated
-    _require((info.ended is None) == goes_on, f"info.ended is {info.ended} at the wrong time")
-    _require(
+    require((info.ended is None) == goes_on, f"info.ended is {info.ended} at the wrong time")
+    require(
         (info.ended == Ended.LIMIT) == truncated,
         f"truncated is {truncated}, and info.ended is {info.ended}",
     )
@@ -215,24 +201,24 @@ def _check_observation(observation: Observation) -> None:
     for key, thor_object in view.objects.items():
         object_id = thor_object.object_id
         object_type = thor_object.object_type
-        _require(key == object_id, f"the object {object_id} is kept as {key}")
-        _require(bool(_ID.fullmatch(key)), f"{key!r:.80} is no id of the form Type|x|y|z")
+        require(key == object_id, f"the object {object_id} is kept as {key}")
+        require(bool(_ID.fullmatch(key)), f"{key!r:.80} is no id of the form Type|x|y|z")
         named = object_type_of(key)
         problem = f"{key} says that it is a {named}, and is a {object_type}"
-        _require(named == object_type, problem)
+        require(named == object_type, problem)
     for key in view.inventory:
-        _require(key in view.objects, f"{key}, which is held, is not among the objects")
+        require(key in view.objects, f"{key}, which is held, is not among the objects")
     if view.frame is not None:
         shape = view.frame.shape
         kind = view.frame.dtype
-        _require(kind == np.uint8, f"a frame is of {kind}, not of bytes")
-        _require(
+        require(kind == np.uint8, f"a frame is of {kind}, not of bytes")
+        require(
             len(shape) == 3 and shape[2] == 3,
             f"a frame has the shape {shape}, not (height, width, 3)",
         )
     if observation.frame is not None and view.frame is not None:
         kept = np.asarray(observation.frame.load())
-        _require(
+        require(
             np.array_equal(kept, view.frame),
             f"{observation.frame.path} is another picture than the view's",
         )

@@ -12,12 +12,7 @@ from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.household.goals import GoalConditions, goal_conditions
 from infthor_eval.household.navigation import Grid
-from infthor_eval.household.scout import (
-    HORIZON_STEP,
-    find_viewpoint,
-    grid_pose_of,
-    reachable_grid,
-)
+from infthor_eval.household.scout import HORIZON_STEP, find_viewpoint, grid_pose_of, reachable_grid
 from infthor_eval.household.treatments import Treatments
 from infthor_eval.plans.expert import Expert, ExpertAction
 from infthor_eval.plans.history.past import Past

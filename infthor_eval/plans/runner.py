@@ -9,12 +9,7 @@ import msgspec
 from infthor_eval.episodes.records import NOT_ATTEMPTED
 from infthor_eval.episodes.running import EpisodeResult, EpisodeRunner
 from infthor_eval.plans.actors.factory import ActorFactory
-from infthor_eval.plans.actors.protocols import (
-    Act,
-    AskingActor,
-    EndedActor,
-    PlanSituation,
-)
+from infthor_eval.plans.actors.protocols import Act, AskingActor, EndedActor, PlanSituation
 from infthor_eval.plans.environment import PlanEnvironment, StepOutcome
 from infthor_eval.plans.expert import ExpertRefusedError
 from infthor_eval.plans.plan import Plan

@@ -14,14 +14,7 @@ from infthor_eval.plans.tables import overview_table, result_tables
 from infthor_eval.plans.task import check_task_file
 from infthor_eval.plans.twins.results import first_place_score
 from infthor_eval.rates import Rate
-from infthor_eval.runs import (
-    RecordTypes,
-    RunHeader,
-    RunSummary,
-    TaskFile,
-    TaskRequest,
-    UnitRecord,
-)
+from infthor_eval.runs import RecordTypes, RunHeader, RunSummary, TaskFile, TaskRequest, UnitRecord
 from infthor_eval.runs.config import require_tasks
 from infthor_eval.runs.suite import Need
 from infthor_eval.tables import Table

@@ -5,21 +5,11 @@ from typing import Any
 
 from msgspec import UNSET
 
-from infthor_eval.episodes.tables import (
-    NAME_COLUMNS,
-    endings_table,
-    named_tasks,
-    result_notes,
-)
+from infthor_eval.episodes.tables import NAME_COLUMNS, endings_table, named_tasks, result_notes
 from infthor_eval.facets import facet_table
 from infthor_eval.formats.published import PUBLISHED_DATA, published_tables
 from infthor_eval.plans.config import PlansTaskConfig
-from infthor_eval.plans.summary import (
-    BY_DISTANCE,
-    BY_TOKENS,
-    FINAL_COLUMNS,
-    PlanTaskSummary,
-)
+from infthor_eval.plans.summary import BY_DISTANCE, BY_TOKENS, FINAL_COLUMNS, PlanTaskSummary
 from infthor_eval.rates import Rate, format_number, format_percent
 from infthor_eval.runs import RunSummary
 from infthor_eval.tables import Column, Row, Table

@@ -43,6 +43,7 @@ from infthor_eval.runs import (
     Workload,
 )
 from infthor_eval.runs.generation_kwargs import decoding_of
+from infthor_eval.runs.journals.records import Typed
 from infthor_eval.runs.limiting import limit_items
 from infthor_eval.runs.suite import BaselineSubject, Need
 from infthor_eval.settings import NoOptions
@@ -80,14 +81,7 @@ class Question:
         return tuple(map(FrameRef, self.pictures))
 
 
-class QuestionAnswer(
-    msgspec.Struct,
-    frozen=True,
-    kw_only=True,
-    omit_defaults=True,
-    tag_field="type",
-    tag="question_answer",
-):
+class QuestionAnswer(Typed, frozen=True, kw_only=True, tag="question_answer"):
     """The payload of a record: a question and the reply to it.
 
     Attributes:
@@ -105,7 +99,7 @@ class QuestionAnswer(
     kind: str = ""
     n_pictures: Count = 0
     reply: str | None = None
-    scores: dict[str, Share] = {}
+    scores: dict[str, Share] = msgspec.field(default_factory=dict)
     thinking: str | None = None
 
 

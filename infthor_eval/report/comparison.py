@@ -12,7 +12,8 @@ from statistics import fmean, variance
 from typing import Any
 
 from infthor_eval.errors import DataError
-from infthor_eval.report.presenter import GroupScore, Presenter
+from infthor_eval.report.plain import PlainPresenter
+from infthor_eval.report.presenter import GroupScore
 from infthor_eval.runs import Suite, UnitKey, UnitRecord
 from infthor_eval.statistics import Difference, paired_difference
 from infthor_eval.tables import Column, Row, Table, interval_cell
@@ -51,7 +52,7 @@ class Comparison:
 
 
 def compare(
-    suite: Suite, presenter: Presenter, first: Iterable[Record], second: Iterable[Record]
+    suite: Suite, presenter: PlainPresenter, first: Iterable[Record], second: Iterable[Record]
 ) -> list[Comparison]:
     """Compare the records of two runs of a suite on the units that both have a result of."""
     firsts = _by_unit(first)
@@ -123,7 +124,7 @@ class _PairedScores:
 class _TaskComparison:
     """Compares two runs in a task, metric by metric."""
 
-    presenter: Presenter
+    presenter: PlainPresenter
     task: str
     n_unshared: int
 

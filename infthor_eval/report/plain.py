@@ -28,7 +28,25 @@ _LONGEST = 2000  # characters of a field on the page
 
 
 class PlainPresenter:
-    """See `Presenter`: samples are records' fields; there are no charts, figures or replays."""
+    """How results of a suite are presented; a suite overrides what it has more of.
+
+    Here samples are records' fields, and there are no charts, figures or replays.
+
+    Attributes:
+        title: heading of the suite's section; empty for the suite's name.
+        measure: what the primary metric measures, in words.
+        finding: the primary metric as the predicate of a sentence ("gets {} of the plans done").
+        target_label: what a sample's target is called.
+        reply_label: what the reply to a sample is called.
+        member_label: what each record of a group is called, before its letter ("world").
+        main_metric: metric that decides whether a sample is right; None for the first one of each
+            sample.
+        compares_scorers: whether the metrics judge the same reply, so that samples can be filtered
+            by disagreement.
+        replay: replays recorded episodes; None if the suite has no episodes.
+        figures: figures by name, as `report --figure` takes it.
+        columns: columns of the suite in the table of samples (`report.sample_columns`).
+    """
 
     title: str = ""
     measure: str = "primary metric"
@@ -43,71 +61,81 @@ class PlainPresenter:
     columns: Sequence[SampleColumn] = ()
 
     def measure_of(self, task: str, summary: Any) -> str:
-        """See `Presenter.measure_of`: `measure`."""
+        """Return what the primary metric of a task measures, by the suite's summary of a run;
+        `measure`, unless tasks of the suite measure different things."""
         return self.measure
 
     def finding_of(self, task: str, summary: Any) -> str:
-        """See `Presenter.finding_of`: `finding`."""
+        """Return `finding`, as `measure_of` returns `measure`."""
         return self.finding
 
     def chance(self, task: str, summary: Any, records: Sequence[UnitRecord[Any]]) -> float | None:
-        """See `Presenter.chance`: not known."""
+        """Return what `blind`, which sees no frame, scores in the primary metric of a task, on its
+        answered records, 0 to 1; None if that is not known."""
         return None
 
     def is_share(self, metric: str, scores: Sequence[float]) -> bool:
-        """See `Presenter.is_share`: a metric with a value below 0 or above 1 is none."""
+        """Whether a metric with these scores is a share, which is shown in percent; others are
+        shown as they are. One with a value below 0 or above 1 is none."""
         return all(0 <= score <= 1 for score in scores)
 
     def bounds(self, metric: str) -> tuple[float, float]:
-        """See `Presenter.bounds`: none is known."""
+        """Return the lowest and the highest possible score of a metric, one of `extra_scores` or
+        `group_scores` included; infinite where there is no limit, or none is known."""
         return -math.inf, math.inf
 
     def extra_scores(self, record: UnitRecord[Any]) -> Mapping[str, float]:
-        """See `Presenter.extra_scores`: none."""
+        """Return scores that only some samples have, by name; runs are compared on those."""
         return {}
 
     def extra_ranges(self, record: UnitRecord[Any]) -> Mapping[str, tuple[float, float]]:
-        """See `Presenter.extra_ranges`: none."""
+        """Return the lowest and the highest possible value of each of `extra_scores`."""
         return {}
 
     def explain(self, record: UnitRecord[Any]) -> Sequence[str]:
-        """See `Presenter.explain`: nothing is known."""
+        """Return why the reply of a record got its scores, a line each."""
         return ()
 
     def group(self, record: UnitRecord[Any]) -> str:
-        """See `Presenter.group`: none."""
+        """Return the name of the record's group, which is one sample and right if all of it is.
+
+        A group is of one task, variant and repetition. Empty for a record that is a sample by
+        itself.
+        """
         return ""
 
     def group_scores(self, records: Sequence[UnitRecord[Any]]) -> Iterable[GroupScore]:
-        """See `Presenter.group_scores`: none."""
+        """Return the scores of the groups in a run's records of a task; runs are compared on
+        them."""
         return ()
 
     def opening(self, runs: Sequence[Run]) -> Section | None:
-        """See `Presenter.opening`: none."""
+        """Build the section that comes before the suite's own, with charts and tables of its own;
+        tables of the suite that it has are not shown again."""
         return None
 
     def charts(self, runs: Sequence[Run]) -> Sequence[Chart]:
-        """See `Presenter.charts`: none."""
+        """Draw the charts of the suite's section; its tables are `Suite.tables`."""
         return ()
 
     def sections(self, runs: Sequence[Run]) -> Iterable[Section]:
-        """See `Presenter.sections`: none."""
+        """Build further sections, which follow the suite's own."""
         return ()
 
     def describe(self, record: UnitRecord[Any]) -> Description:
-        """See `Presenter.describe`: the unit's id."""
+        """Describe the sample of a record: its id, where nothing more is known."""
         return Description(record.id)
 
     def reply(self, record: UnitRecord[Any]) -> str:
-        """See `Presenter.reply`: none, `details` has all fields."""
+        """Return the reply of a record; empty if there is none, or if `details` has it."""
         return ""
 
     def reply_tokens(self, record: UnitRecord[Any]) -> ReplyTokens | None:
-        """See `Presenter.reply_tokens`: none are known."""
+        """Return the tokens of the reply; None if they were not recorded."""
         return None
 
     def details(self, record: UnitRecord[Any]) -> Mapping[str, str]:
-        """See `Presenter.details`: the fields of the record's payload."""
+        """Return further facts about a record, by name: the fields of its payload."""
         payload = record.payload
         fields = {
             field.name: getattr(payload, field.name) for field in msgspec.structs.fields(payload)
@@ -115,21 +143,23 @@ class PlainPresenter:
         return {name: _text(value) for name, value in fields.items() if value is not None}
 
     def recalled(self, record: UnitRecord[Any]) -> Sequence[int | str]:
-        """See `Presenter.recalled`: nothing."""
+        """Return what a memory recalled for a record: places of frames in the trajectory, and
+        texts; empty without a memory."""
         return ()
 
     def steps(self, record: UnitRecord[Any]) -> Sequence[StepRow]:
-        """See `Presenter.steps`: none."""
+        """Return the steps of a recorded episode; empty if it has none."""
         return ()
 
     def request_frames(self, run: Run, data: Path | None) -> FindFrames:
-        """See `Presenter.request_frames`: none."""
+        """Return what finds the frames of a record's request (`prompts`), in their order; it raises
+        DataError where they cannot be found."""
         return lambda _: ()
 
     def timelines(
         self, runs: Sequence[Run], data: Path | None, thumbnails: ThumbnailStore
     ) -> Timelines:
-        """See `Presenter.timelines`: none."""
+        """Find the samples' frames; `data` is the set's folder, None for the one a run names."""
         return Timelines()
 
 

@@ -1,7 +1,7 @@
-"""How the results of a suite are presented: on the report's page, as figures and as recordings.
+"""What presenters of suites return: for the report's page, as figures and as recordings.
 
-`infthor_eval.suites.find_presenter` finds the presenter of a suite; `PlainPresenter` serves suites
-that have none.
+`infthor_eval.suites.find_presenter` finds the presenter of a suite; the base of all, which serves
+suites that have none, is `report.plain.PlainPresenter`.
 """
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
@@ -13,12 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 from PIL import Image
 
 from infthor_eval.formats.frames import FrameRef
-from infthor_eval.report.charts import Chart
-from infthor_eval.report.descriptions import Description, StepRow
-from infthor_eval.report.sample_columns import SampleColumn
 from infthor_eval.report.web.samples import FrameFacts, Timeline
-from infthor_eval.report.web.sections import Section
-from infthor_eval.report.web.thumbnails import ThumbnailStore
 from infthor_eval.run import Run
 from infthor_eval.runs import UnitKey, UnitRecord
 from infthor_eval.tables import Table
@@ -214,112 +209,3 @@ class Replay(Protocol):
 
     def draw_sheet(self, frames: Iterable[Any], heading: str) -> Image.Image:
         """Draw the frames as one picture with a row per episode."""
-
-
-class Presenter(Protocol):
-    """How results of a suite are presented.
-
-    Attributes:
-        title: heading of the suite's section; empty for the suite's name.
-        measure: what the primary metric measures, in words.
-        finding: the primary metric as the predicate of a sentence ("gets {} of the plans done").
-        target_label: what a sample's target is called.
-        reply_label: what the reply to a sample is called.
-        member_label: what each record of a group is called, before its letter ("world").
-        main_metric: metric that decides whether a sample is right; None for the first one of each
-            sample.
-        compares_scorers: whether the metrics judge the same reply, so that samples can be filtered
-            by disagreement.
-        replay: replays recorded episodes; None if the suite has no episodes.
-        figures: figures by name, as `report --figure` takes it.
-        columns: columns of the suite in the table of samples (`report.sample_columns`).
-    """
-
-    title: str
-    measure: str
-    finding: str
-    target_label: str
-    reply_label: str
-    member_label: str
-    main_metric: str | None
-    compares_scorers: bool
-    replay: Replay | None
-    figures: Mapping[str, Figure]
-    columns: Sequence[SampleColumn]
-
-    def measure_of(self, task: str, summary: Any) -> str:
-        """Return what the primary metric of a task measures, by the suite's summary of a run;
-        `measure`, unless tasks of the suite measure different things."""
-
-    def finding_of(self, task: str, summary: Any) -> str:
-        """Return `finding`, as `measure_of` returns `measure`."""
-
-    def chance(self, task: str, summary: Any, records: Sequence[Record]) -> float | None:
-        """Return what `blind`, which sees no frame, scores in the primary metric of a task, on its
-        answered records, 0 to 1; None if that is not known."""
-
-    def is_share(self, metric: str, scores: Sequence[float]) -> bool:
-        """Whether a metric with these scores is a share, which is shown in percent; others are
-        shown as they are."""
-
-    def bounds(self, metric: str) -> tuple[float, float]:
-        """Return the lowest and the highest possible score of a metric, one of `extra_scores` or
-        `group_scores` included; infinite where there is no limit, or none is known."""
-
-    def extra_scores(self, record: Record) -> Mapping[str, float]:
-        """Return scores that only some samples have, by name; runs are compared on those."""
-
-    def extra_ranges(self, record: Record) -> Mapping[str, tuple[float, float]]:
-        """Return the lowest and the highest possible value of each of `extra_scores`."""
-
-    def explain(self, record: Record) -> Sequence[str]:
-        """Return why the reply of a record got its scores, a line each."""
-
-    def group(self, record: Record) -> str:
-        """Return the name of the record's group, which is one sample and right if all of it is.
-
-        A group is of one task, variant and repetition. Empty for a record that is a sample by
-        itself.
-        """
-
-    def group_scores(self, records: Sequence[Record]) -> Iterable[GroupScore]:
-        """Return the scores of the groups in a run's records of a task; runs are compared on
-        them."""
-
-    def opening(self, runs: Sequence[Run]) -> Section | None:
-        """Build the section that comes before the suite's own, with charts and tables of its own;
-        tables of the suite that it has are not shown again."""
-
-    def charts(self, runs: Sequence[Run]) -> Sequence[Chart]:
-        """Draw the charts of the suite's section; its tables are `Suite.tables`."""
-
-    def sections(self, runs: Sequence[Run]) -> Iterable[Section]:
-        """Build further sections, which follow the suite's own."""
-
-    def describe(self, record: Record) -> Description:
-        """Describe the sample of a record."""
-
-    def reply(self, record: Record) -> str:
-        """Return the reply of a record; empty if there is none."""
-
-    def reply_tokens(self, record: Record) -> ReplyTokens | None:
-        """Return the tokens of the reply; None if they were not recorded."""
-
-    def details(self, record: Record) -> Mapping[str, str]:
-        """Return further facts about a record, by name."""
-
-    def recalled(self, record: Record) -> Sequence[int | str]:
-        """Return what a memory recalled for a record: places of frames in the trajectory, and
-        texts; empty without a memory."""
-
-    def steps(self, record: Record) -> Sequence[StepRow]:
-        """Return the steps of a recorded episode; empty if it has none."""
-
-    def request_frames(self, run: Run, data: Path | None) -> FindFrames:
-        """Return what finds the frames of a record's request (`prompts`), in their order; it raises
-        DataError where they cannot be found."""
-
-    def timelines(
-        self, runs: Sequence[Run], data: Path | None, thumbnails: ThumbnailStore
-    ) -> Timelines:
-        """Find the samples' frames; `data` is the set's folder, None for the one a run names."""

@@ -1,6 +1,6 @@
 """What the checks share: clauses, their error, and the questions that are asked."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any, Generic, Protocol
 
@@ -51,16 +51,21 @@ def check_members(adapter: Any) -> None:
 
 def check_identity(adapter: Model | Policy) -> None:
     """Check name, identity and capabilities; `ContractError` for a clause that does not hold."""
-    identity = adapter.identity()
+    check_identity_values(adapter.identity)
+    require(bool(adapter.name), "the name is empty")
+    require(adapter.capabilities.batch_size >= 1, "batch_size is below 1")
+    require(adapter.capabilities.max_in_flight >= 1, "max_in_flight is below 1")
+
+
+def check_identity_values(identify: Callable[[], Mapping[str, Any]]) -> None:
+    """Check that an identity is the same each time, and JSON values."""
+    identity = dict(identify())
     try:
         again = json_values(identity, "identity()")
     except ValueError as error:
         raise ContractError(str(error)) from error
     require(again == identity, "identity() changes when written as JSON and read back")
-    require(adapter.identity() == identity, "identity() differs from call to call")
-    require(bool(adapter.name), "the name is empty")
-    require(adapter.capabilities.batch_size >= 1, "batch_size is below 1")
-    require(adapter.capabilities.max_in_flight >= 1, "max_in_flight is below 1")
+    require(dict(identify()) == identity, "identity() differs from call to call")
 
 
 @contextmanager

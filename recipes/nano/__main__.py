@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from infthor_eval.cli.help import ExampleCommand
+from infthor_eval.cli.help import example_command
 from infthor_eval.cli.main import run_program
 from infthor_eval.cli.options.values import PATH, parse_pairs
 from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
@@ -28,10 +28,8 @@ _RECIPES = {path.stem: path for path in Path(__file__).parent.glob("*.yaml")}
 _STAGES = {"vision": "recognising objects", "reading": "answering and acting"}
 
 
-@click.command(
-    "python -m recipes.nano",
-    cls=ExampleCommand,
-    example="python -m recipes.nano --recipe small --out runs/small --workers 2",
+@example_command(
+    "python -m recipes.nano", "python -m recipes.nano --recipe small --out runs/small --workers 2"
 )
 @click.option(
     "--recipe",

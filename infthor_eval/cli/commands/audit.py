@@ -5,16 +5,16 @@ from typing import TYPE_CHECKING
 
 import click
 
-from infthor_eval.cli.help import ExampleCommand
+from infthor_eval.cli.help import example_command
 from infthor_eval.cli.options.values import PATH, SET
+from infthor_eval.cli.progress.notes import print_failure, print_left_out, print_note
+from infthor_eval.errors import DataError, UsageError
 
 if TYPE_CHECKING:
     from infthor_eval.runs import RunSummary
 
 
-@click.command(
-    "audit", cls=ExampleCommand, example="infthor-eval audit SET --balanced qa_set_balanced.csv"
-)
+@example_command("audit", "infthor-eval audit SET --balanced qa_set_balanced.csv")
 @click.argument("set_folder", metavar="SET", type=SET)
 @click.argument("runs", metavar="[RUN]...", nargs=-1, type=PATH)
 @click.option(
@@ -31,8 +31,6 @@ def command(set_folder: Path, runs: tuple[Path, ...], balanced: Path | None) -> 
     whether the hand was full and how much was in view. They learn from questions on other
     trajectories, and from those in other scenes alone.
     """
-    from infthor_eval.cli.progress.notes import print_left_out, print_note
-    from infthor_eval.errors import DataError, UsageError
     from infthor_eval.formats.nieh_set import NiehSet
     from infthor_eval.formats.qa_csv import encode_questions, write_questions
     from infthor_eval.nieh.guessing.audit import audit
@@ -75,8 +73,6 @@ def command(set_folder: Path, runs: tuple[Path, ...], balanced: Path | None) -> 
 
 
 def _read_summary(folder: Path) -> "RunSummary":
-    from infthor_eval.cli.progress.notes import print_failure
-    from infthor_eval.errors import UsageError
     from infthor_eval.nieh.results.summary import NiehSummary
     from infthor_eval.run import Run
 

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from infthor_eval.cli.help import ExampleCommand, ExampleGroup
-from infthor_eval.cli.options.values import PATH, FiniteFloat, parse_model_args
+from infthor_eval.cli.help import ExampleGroup
+from infthor_eval.cli.options.values import PATH, FiniteFloat, default_option, parse_model_args
+from infthor_eval.cli.progress.notes import prints_as_notes
 
 if TYPE_CHECKING:
     from model_adapters.check import CheckResult
@@ -23,11 +24,7 @@ def command() -> None:
     """Check a model, a memory or a policy of your own."""
 
 
-@command.command(
-    "adapter",
-    cls=ExampleCommand,
-    example="infthor-eval check adapter ./my_adapter.py:MyModel",
-)
+@command.command("adapter", example="infthor-eval check adapter ./my_adapter.py:MyModel")
 @click.argument("model")
 @click.option(
     "--model-args", default="", metavar="K=V,...", help="Options of MODEL (see `ls models MODEL`)."
@@ -38,7 +35,6 @@ def check_adapter(model: str, model_args: str) -> int:
     The model gets a few dozen short requests with frames of one colour. Each clause of the contract
     has a line of output; docs/own-models.md explains them. Exit code 1 if a clause is broken.
     """
-    from infthor_eval.cli.progress.notes import prints_as_notes
     from model_adapters import run_checks
     from model_adapters.refusals import wrap_closing
     from model_adapters.registry import build
@@ -52,9 +48,7 @@ def check_adapter(model: str, model_args: str) -> int:
     return code
 
 
-@command.command(
-    "memory", cls=ExampleCommand, example="infthor-eval check memory ./my_memory.py:MyMemory"
-)
+@command.command("memory", example="infthor-eval check memory ./my_memory.py:MyMemory")
 @click.argument("memory")
 @click.option(
     "--memory-args",
@@ -69,7 +63,6 @@ def check_memory(memory: str, memory_args: str) -> int:
     contract has a line of output; docs/memories.md explains them. Exit code 1 if a clause is
     broken.
     """
-    from infthor_eval.cli.progress.notes import prints_as_notes
     from infthor_eval.memory import check, open_memory, parse_options
 
     options = parse_options(memory_args) or {}
@@ -79,9 +72,7 @@ def check_memory(memory: str, memory_args: str) -> int:
 
 
 @command.command(
-    "parity",
-    cls=ExampleCommand,
-    example="infthor-eval check parity openvla --reference-url http://HOST:8000",
+    "parity", example="infthor-eval check parity openvla --reference-url http://HOST:8000"
 )
 @click.argument("model")
 @click.option(
@@ -102,13 +93,7 @@ def check_memory(memory: str, memory_args: str) -> int:
     metavar="K=V,...",
     help="Options of MODEL; unnorm_key is sent to the server too.",
 )
-@click.option(
-    "--tolerance",
-    type=FiniteFloat(min=0),
-    default=1e-6,
-    show_default=True,
-    help="Largest difference of equal actions.",
-)
+@default_option("--tolerance", FiniteFloat(min=0), 1e-6, "Largest difference of equal actions.")
 def check_parity(
     model: str,
     reference_url: str,
@@ -121,7 +106,6 @@ def check_parity(
 
     Exit code 1 if one differs.
     """
-    from infthor_eval.cli.progress.notes import prints_as_notes
     from infthor_eval.report.terminal import print_table, table_console
     from model_adapters.policies.parity import (
         INSTRUCTIONS,
@@ -149,7 +133,6 @@ def check_parity(
 
 def _print_checks(name: str, results: Iterable[CheckResult]) -> int:
     """Print a line a result and one for all; return the exit code, 1 if a clause is broken."""
-    from infthor_eval.cli.progress.notes import prints_as_notes
     from infthor_eval.terminal import print_line
 
     n_broken = 0

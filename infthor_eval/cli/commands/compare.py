@@ -9,18 +9,14 @@ from typing import TYPE_CHECKING
 
 import click
 
-from infthor_eval.cli.help import ExampleCommand
+from infthor_eval.cli.help import example_command
 from infthor_eval.cli.options.values import PATH
 
 if TYPE_CHECKING:
     from infthor_eval.run import Run
 
 
-@click.command(
-    "compare",
-    cls=ExampleCommand,
-    example="infthor-eval compare results/oracle/RUN results/blind/RUN",
-)
+@example_command("compare", "infthor-eval compare results/oracle/RUN results/blind/RUN")
 @click.argument("folders", metavar="RUN...", nargs=-1, required=True, type=PATH)
 @click.option(
     "--same-questions",

@@ -25,15 +25,8 @@ import click
 import msgspec
 from rich.text import Text
 
-from infthor_eval.cli.help import ExampleCommand
-from infthor_eval.cli.options.values import (
-    PATH,
-    SET,
-    ModelArgs,
-    ModelList,
-    ModelSpec,
-    split_names,
-)
+from infthor_eval.cli.help import example_command
+from infthor_eval.cli.options.values import PATH, SET, ModelArgs, ModelList, ModelSpec, split_names
 from infthor_eval.errors import UsageError, in_one_line
 from infthor_eval.nieh.published.hub_data import default_folder
 from infthor_eval.storage.folders import user_cache
@@ -75,11 +68,7 @@ class Check(msgspec.Struct, frozen=True):
     hint: str = ""
 
 
-@click.command(
-    "doctor",
-    cls=ExampleCommand,
-    example="infthor-eval doctor --rehearse --model qwen2.5-vl --tasks nieh",
-)
+@example_command("doctor", "infthor-eval doctor --rehearse --model qwen2.5-vl --tasks nieh")
 @click.option(
     "--data",
     type=SET,

@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from infthor_eval.cli.help import ExampleCommand
+from infthor_eval.cli.help import example_command
 from infthor_eval.cli.options.values import PATH, SET, output_option
+from infthor_eval.cli.progress.notes import print_failure, print_left_out, print_note, print_refused
+from infthor_eval.errors import UsageError
 from infthor_eval.exports.registry import FORMATS
 
 if TYPE_CHECKING:
@@ -17,10 +19,8 @@ if TYPE_CHECKING:
 _RELATIONSHIPS = ("first_party", "third_party", "collaborative", "other")
 
 
-@click.command(
-    "export",
-    cls=ExampleCommand,
-    example="infthor-eval export results/*/nieh_mini-* --format every-eval-ever --out exported",
+@example_command(
+    "export", "infthor-eval export results/*/nieh_mini-* --format every-eval-ever --out exported"
 )
 @click.argument("runs", metavar="RUN...", nargs=-1, required=True, type=PATH)
 @click.option(
@@ -54,7 +54,6 @@ def export(runs: tuple[Path, ...], file_format: str, out: Path, **options: Any) 
     What the format has no place for is named in a line, and what a run has not done, or failed at.
     Nothing is uploaded.
     """
-    from infthor_eval.cli.progress.notes import print_failure, print_note
     from infthor_eval.exports.registry import find_writer
     from infthor_eval.exports.request import ExportRequest
     from infthor_eval.exports.subjects import require_one_model
@@ -78,18 +77,12 @@ def export(runs: tuple[Path, ...], file_format: str, out: Path, **options: Any) 
 
 
 def _check_hub_name(option: str, name: str | None) -> None:
-    from infthor_eval.errors import UsageError
-
     owner, _, rest = (name or "").partition("/")
     if name is not None and not (owner and rest):
         raise UsageError(f"{option} {name!r:.60}: is not OWNER/NAME; write both, as on the hub")
 
 
-@click.command(
-    "import-replies",
-    cls=ExampleCommand,
-    example="infthor-eval import-replies LOG --data SET --out results",
-)
+@example_command("import-replies", "infthor-eval import-replies LOG --data SET --out results")
 @click.argument("logs", metavar="LOG...", nargs=-1, required=True, type=PATH)
 @click.option(
     "--data", type=SET, metavar="SET", help="Folder of the NIEH set that the replies are about."
@@ -113,7 +106,6 @@ def import_replies(
     """
     from infthor_eval.cli.options.show import ShowOptions
     from infthor_eval.cli.results import print_results
-    from infthor_eval.errors import UsageError
     from infthor_eval.formats.plan_logs import is_plan_log
 
     plan_logs = [log for log in logs if is_plan_log(log)]
@@ -133,7 +125,6 @@ def _import_replies(
     logs: Sequence[Path], data: Path, model: str | None, output: Path
 ) -> Iterator[tuple["Run", int]]:
     """Yield the results of runs of logs of replies, and the number of rows not imported."""
-    from infthor_eval.cli.progress.notes import print_left_out, print_note, print_refused
     from infthor_eval.formats.nieh_set import NiehSet
     from infthor_eval.nieh.published.imported_replies import import_logs
     from infthor_eval.nieh.suite import NiehSuite
@@ -166,7 +157,6 @@ def _import_plans(
     logs: Sequence[Path], model: str | None, output: Path
 ) -> Iterator[tuple["Run", int]]:
     """Yield the results of runs of logs of plans, and the number of rows not imported."""
-    from infthor_eval.cli.progress.notes import print_note, print_refused
     from infthor_eval.formats.plan_logs import read_plan_log
     from infthor_eval.plans.published.imported_counts import import_counts
     from infthor_eval.plans.suite import PlansSuite

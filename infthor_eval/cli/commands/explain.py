@@ -4,15 +4,11 @@ from pathlib import Path
 
 import click
 
-from infthor_eval.cli.help import ExampleCommand
+from infthor_eval.cli.help import example_command
 from infthor_eval.cli.options.values import PATH
 
 
-@click.command(
-    "explain",
-    cls=ExampleCommand,
-    example="infthor-eval explain results/A/RUN results/B/RUN",
-)
+@example_command("explain", "infthor-eval explain results/A/RUN results/B/RUN")
 @click.argument("first", metavar="A", type=PATH)
 @click.argument("second", metavar="B", type=PATH)
 @click.option("--all", "every", is_flag=True, help="Show every question that differs, not a few.")

@@ -4,11 +4,11 @@ from pathlib import Path
 
 import click
 
-from infthor_eval.cli.help import ExampleCommand
+from infthor_eval.cli.help import example_command
 from infthor_eval.cli.options.values import PATH
 
 
-@click.command("fetch", cls=ExampleCommand, example="infthor-eval fetch nieh")
+@example_command("fetch", "infthor-eval fetch nieh")
 @click.argument("what", type=click.Choice(["nieh"]))
 @click.option("--out", "--dir", "folder", type=PATH, help="Folder for the data, not the cache.")
 @click.option("--token", help="Access token; default: the one that `hf auth login` stored.")

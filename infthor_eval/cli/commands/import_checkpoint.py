@@ -4,14 +4,12 @@ from pathlib import Path
 
 import click
 
-from infthor_eval.cli.help import ExampleCommand
-from infthor_eval.cli.options.values import PATH, parse_model_args
+from infthor_eval.cli.help import example_command
+from infthor_eval.cli.options.values import PATH, default_option, parse_model_args
 
 
-@click.command(
-    "import-checkpoint",
-    cls=ExampleCommand,
-    example="infthor-eval import-checkpoint global_step_1000 --out checkpoint",
+@example_command(
+    "import-checkpoint", "infthor-eval import-checkpoint global_step_1000 --out checkpoint"
 )
 @click.argument("checkpoint")
 @click.option(
@@ -23,11 +21,10 @@ from infthor_eval.cli.options.values import PATH, parse_model_args
 @click.option(
     "--model-args", default="", metavar="K=V,...", help="Its options (pretrained, dtype, ...)."
 )
-@click.option(
+@default_option(
     "--prompt",
-    type=click.Choice(("plain", "chat")),
+    click.Choice(("plain", "chat")),
     default="plain",
-    show_default=True,
     help="Its prompts: the bare sequence, or for the Qwen2.5-VL of branch dev the base model's "
     "chat template.",
 )

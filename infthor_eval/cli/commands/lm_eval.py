@@ -5,12 +5,7 @@ from importlib.metadata import version
 
 import click
 
-from infthor_eval.errors import (
-    InfthorError,
-    UsageError,
-    describe_exception,
-    in_one_line,
-)
+from infthor_eval.errors import InfthorError, UsageError, describe_exception, in_one_line
 
 
 @click.command(

@@ -11,7 +11,7 @@ from rich import box
 from rich.markup import escape
 from rich.table import Table as RichTable
 
-from infthor_eval.cli.help import ExampleCommand, ExampleGroup
+from infthor_eval.cli.help import ExampleGroup
 from infthor_eval.cli.options.values import PATH, SCENE_KINDS, floor_plans_option, include_option
 from infthor_eval.cli.progress.notes import print_failure, print_note
 from infthor_eval.errors import InfthorError, ModelError, unknown_name
@@ -47,7 +47,7 @@ def command(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
-@command.command("models", cls=ExampleCommand, example="infthor-eval ls models qwen2.5-vl")
+@command.command("models", example="infthor-eval ls models qwen2.5-vl")
 @click.argument("name", required=False)
 def _models(name: str | None) -> None:
     """Models and baselines, one a line; or the options of model NAME, with what each does."""
@@ -99,7 +99,7 @@ def _engine(model: str) -> str:
     return "transformers" if has_option(model, "threads") else "-"
 
 
-@command.command("memories", cls=ExampleCommand, example="infthor-eval ls memories clip")
+@command.command("memories", example="infthor-eval ls memories clip")
 @click.argument("name", required=False)
 def _memories(name: str | None) -> None:
     """Memories for `--memory`, one a line; or the options of memory NAME, with their defaults."""
@@ -121,9 +121,7 @@ def _memories(name: str | None) -> None:
     table_console().print(table, soft_wrap=False)
 
 
-@command.command(
-    "tasks", cls=ExampleCommand, example="infthor-eval ls tasks --include-path my_tasks"
-)
+@command.command("tasks", example="infthor-eval ls tasks --include-path my_tasks")
 @include_option
 @click.option(
     "--path",
@@ -198,7 +196,7 @@ def _tokens(size: str) -> int:
     return int(size[:-1]) * (1000 if size.endswith("m") else 1)
 
 
-@command.command("scenes", cls=ExampleCommand, example="infthor-eval ls scenes")
+@command.command("scenes", example="infthor-eval ls scenes")
 @floor_plans_option
 def _scenes(data: Path | None) -> None:
     """Scenes of the embedded simulator."""
@@ -216,7 +214,7 @@ def _scenes(data: Path | None) -> None:
     console().print(table, soft_wrap=False)
 
 
-@command.command("runs", cls=ExampleCommand, example="infthor-eval ls runs results")
+@command.command("runs", example="infthor-eval ls runs results")
 @click.argument("folder", metavar="[DIR]", type=PATH, default=Path("results"))
 @click.option(
     "--format",

@@ -7,9 +7,9 @@ from typing import Any
 
 import click
 
-from infthor_eval.cli.help import ExampleCommand
+from infthor_eval.cli.help import example_command
 from infthor_eval.cli.options.run import RunOptions, run_options
-from infthor_eval.cli.options.values import FiniteFloat, WholeNumber
+from infthor_eval.cli.options.values import FiniteFloat, WholeNumber, default_option
 from infthor_eval.cli.progress.notes import NOTES, print_note, prints_as_notes
 from infthor_eval.cli.progress.pace import format_duration
 from infthor_eval.cli.progress.runs import check_others, print_workload
@@ -23,18 +23,8 @@ from infthor_eval.terminal import progress_bar
 _COLUMNS = ("units", "measured", "frames", "requests", "tokens read", "encoded", "written", "time")
 
 
-@click.command(
-    "plan",
-    cls=ExampleCommand,
-    example="infthor-eval plan --model qwen2.5-vl --tasks nieh --price-per-hour 2.5",
-)
-@click.option(
-    "--measure",
-    type=WholeNumber(1),
-    default=6,
-    show_default=True,
-    help="Units of each task to measure.",
-)
+@example_command("plan", "infthor-eval plan --model qwen2.5-vl --tasks nieh --price-per-hour 2.5")
+@default_option("--measure", WholeNumber(1), 6, "Units of each task to measure.")
 @click.option(
     "--price-per-hour",
     type=FiniteFloat(min=0),

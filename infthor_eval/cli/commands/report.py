@@ -8,8 +8,12 @@ from typing import TYPE_CHECKING
 
 import click
 
-from infthor_eval.cli.help import ExampleCommand
+from infthor_eval.cli.help import example_command
 from infthor_eval.cli.options.values import PATH, SET, WholeNumber
+from infthor_eval.cli.progress.notes import print_failure, print_note
+from infthor_eval.errors import UsageError
+from infthor_eval.storage.files import prepare_file, prepare_folder, require_writable
+from infthor_eval.terminal import error_console, print_line, progress_bar
 
 if TYPE_CHECKING:
     from rich.progress import Progress
@@ -24,11 +28,7 @@ _TABLE_FORMS = ("csv", "latex", "markdown")
 _FOLDER = Path("results/figures")
 
 
-@click.command(
-    "report",
-    cls=ExampleCommand,
-    example="infthor-eval report results/*/nieh_mini-* --out report.html",
-)
+@example_command("report", "infthor-eval report results/*/nieh_mini-* --out report.html")
 @click.argument("runs", metavar="RUN...", nargs=-1, required=True, type=PATH)
 @click.option(
     "--out",
@@ -101,7 +101,6 @@ def command(
     `planner`, or `planner-arm`, among them is the upper bound. Only trajectories that all runs have
     are drawn.
     """
-    from infthor_eval.errors import UsageError
     from infthor_eval.report.presenter import FigureRequest
     from infthor_eval.report.web.build import PageRequest
 
@@ -130,13 +129,11 @@ def command(
 
 def _export_table(folders: Sequence[Path], form: str | None, spreadsheet: Path | None) -> None:
     """Print the table of the runs in a form, or write it as a spreadsheet."""
-    from infthor_eval.cli.progress.notes import print_failure
     from infthor_eval.report.exporting import export_tables
     from infthor_eval.report.headline.results import task_results
     from infthor_eval.report.headline.tables import results_table
     from infthor_eval.report.spreadsheet import prepare_spreadsheet, write_spreadsheet
     from infthor_eval.run import open_runs
-    from infthor_eval.terminal import print_line
 
     if spreadsheet is not None:
         prepare_spreadsheet(spreadsheet)
@@ -150,9 +147,7 @@ def _export_table(folders: Sequence[Path], form: str | None, spreadsheet: Path |
 
 
 def _write_index(folders: Sequence[Path], request: PageRequest, out: Path) -> None:
-    from infthor_eval.cli.progress.notes import print_failure
     from infthor_eval.report.web.index import write_index
-    from infthor_eval.terminal import error_console, print_line, progress_bar
 
     with progress_bar(error_console()) as progress:
         index = write_index(folders, out, request, _PageBars(progress))
@@ -162,13 +157,9 @@ def _write_index(folders: Sequence[Path], request: PageRequest, out: Path) -> No
 
 
 def _write_page(folders: Sequence[Path], request: PageRequest, out: Path) -> None:
-    from infthor_eval.cli.progress.notes import print_failure
-    from infthor_eval.errors import UsageError
     from infthor_eval.report.web.build import build_page
     from infthor_eval.report.web.page import write_page
     from infthor_eval.run import open_runs
-    from infthor_eval.storage.files import prepare_file
-    from infthor_eval.terminal import error_console, print_line, progress_bar
 
     if out.suffix.lower() not in (".html", ".htm"):
         raise UsageError(f"--out {out}: the page is an .html file; name one")
@@ -186,8 +177,6 @@ def _write_page(folders: Sequence[Path], request: PageRequest, out: Path) -> Non
 def _runs_among(paths: Sequence[Path]) -> list[Path]:
     """Return the folders of runs, also below other folders; of another path, such as an earlier
     page, it is said that it is none."""
-    from infthor_eval.cli.progress.notes import print_note
-    from infthor_eval.errors import UsageError
     from infthor_eval.runs.stored.search import run_folders
 
     # What does not exist is refused where it is read.
@@ -221,12 +210,9 @@ class _PageBars:
 
 
 def _draw(folders: tuple[Path, ...], name: str, request: FigureRequest, out: Path) -> None:
-    from infthor_eval.cli.progress.notes import print_failure
     from infthor_eval.report.figures import save_figure
     from infthor_eval.report.named_figures import build_figure
     from infthor_eval.report.terminal import print_table, table_console
-    from infthor_eval.storage.files import prepare_folder, require_writable
-    from infthor_eval.terminal import print_line
 
     require_writable(out)
     result = build_figure(folders, name, request, print_failure)

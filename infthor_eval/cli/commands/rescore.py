@@ -9,15 +9,17 @@ from typing import TYPE_CHECKING
 
 import click
 
-from infthor_eval.cli.help import ExampleCommand
+from infthor_eval.cli.help import example_command
 from infthor_eval.cli.options.values import (
     PATH,
     ModelArgs,
     ModelList,
     ModelSpec,
     WholeNumber,
+    default_option,
     output_option,
 )
+from infthor_eval.cli.progress.notes import NOTES, print_failure, print_note, prints_as_notes
 
 if TYPE_CHECKING:
     from infthor_eval.nieh.records import NiehAnswer
@@ -33,11 +35,7 @@ _JUDGE_TOKENS = {"yes-no": 16, "published": 64}
 _JUDGE_PROMPT = "yes-no"
 
 
-@click.command(
-    "rescore",
-    cls=ExampleCommand,
-    example="infthor-eval rescore results/blind/RUN --scorer my_scorer.py:measure",
-)
+@example_command("rescore", "infthor-eval rescore results/blind/RUN --scorer my_scorer.py:measure")
 @click.argument("folder", metavar="RUN", type=PATH)
 @click.option(
     "--scorer",
@@ -67,13 +65,7 @@ _JUDGE_PROMPT = "yes-no"
     help="Most tokens of a verdict; default: 16, and 64 for a score. A model that reasons first "
     "needs more.",
 )
-@click.option(
-    "--seed",
-    type=WholeNumber(),
-    default=0,
-    show_default=True,
-    help="Seed of the sample that measures the judge.",
-)
+@default_option("--seed", WholeNumber(), 0, "Seed of the sample that measures the judge.")
 @click.option(
     "--key", type=PATH, metavar="KEY", help="Key of a private set, for a run on its public part."
 )
@@ -95,7 +87,6 @@ def command(
     Neither the set nor the model is needed. Replies that are not there stay failed. The exit code
     is 1 if your scorer fails on a reply, or the judge cannot be asked.
     """
-    from infthor_eval.cli.progress.notes import print_failure, prints_as_notes
     from infthor_eval.formats.replies.answer_key import read_key
     from infthor_eval.nieh.own_scorers import find_scorer
     from infthor_eval.nieh.rescoring.keyed import with_key
@@ -140,7 +131,6 @@ def read_source(run: Run) -> Source:
 def _load_judge(
     judge: ModelSpec, more: Mapping[str, str], max_new_tokens: int, seed: int, prompt: str
 ) -> AbstractContextManager[Judge]:
-    from infthor_eval.cli.progress.notes import print_note, prints_as_notes
     from infthor_eval.nieh.rescoring.judging import Judge
     from model_adapters import model_note
 
@@ -153,7 +143,6 @@ def _load_judge(
 
 def _store(rescoring: Rescoring, output: Path) -> Rescored:
     from infthor_eval.cli.progress.bar import PacedBar
-    from infthor_eval.cli.progress.notes import NOTES
     from infthor_eval.terminal import progress_bar
 
     with progress_bar(NOTES) as progress:
@@ -189,8 +178,6 @@ def _print(rescoring: Rescoring, rescored: Rescored) -> None:
 
 
 def _print_counts(report: RescoringReport) -> None:
-    from infthor_eval.cli.progress.notes import print_note
-
     counts = (
         (report.n_failed, "failed by the scorer"),
         (report.n_without_reply, "without a reply stay failed"),
@@ -210,8 +197,6 @@ def _print_counts(report: RescoringReport) -> None:
 
 
 def _print_change(name: str, change: Change) -> None:
-    from infthor_eval.cli.progress.notes import print_note
-
     print_note(
         f"{name}: {change.n_differ} of {change.n_before} scores differ from those in the journal"
     )
@@ -223,7 +208,6 @@ def _print_change(name: str, change: Change) -> None:
 
 def _print_failures(rescored: Rescored) -> int:
     """Print why replies could not be scored or judged; return the number of these."""
-    from infthor_eval.cli.progress.notes import print_failure
     from infthor_eval.cli.results import print_failures
     from infthor_eval.reasons import count_reasons
 

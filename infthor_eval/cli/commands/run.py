@@ -7,14 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from infthor_eval.cli.help import ExampleCommand
+from infthor_eval.cli.help import example_command
 from infthor_eval.cli.options.run import RunOptions, run_options
-from infthor_eval.cli.options.show import (
-    ShowOptions,
-    parse_trackers,
-    show_options,
-    tracker_options,
-)
+from infthor_eval.cli.options.show import ShowOptions, parse_trackers, show_options, tracker_options
 from infthor_eval.cli.options.values import WholeNumber
 from infthor_eval.cli.progress.notes import (
     NOTES,
@@ -44,10 +39,8 @@ if TYPE_CHECKING:
     from infthor_eval.harness.trackers import Trackers
 
 
-@click.command(
-    "run",
-    cls=ExampleCommand,
-    example="infthor-eval run --model oracle,blind,qwen2.5-vl-nano --tasks nieh_mini_gt",
+@example_command(
+    "run", "infthor-eval run --model oracle,blind,qwen2.5-vl-nano --tasks nieh_mini_gt"
 )
 @run_options
 @show_options

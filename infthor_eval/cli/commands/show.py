@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from infthor_eval.cli.help import ExampleCommand
+from infthor_eval.cli.help import example_command
 from infthor_eval.cli.options.show import ShowOptions, sample_options
 from infthor_eval.cli.options.values import PATH
 from infthor_eval.cli.progress.notes import print_failure
@@ -20,11 +20,7 @@ from infthor_eval.run import Run, open_runs
 from infthor_eval.terminal import print_line
 
 
-@click.command(
-    "show",
-    cls=ExampleCommand,
-    example="infthor-eval show results/oracle/RUN results/blind/RUN --full",
-)
+@example_command("show", "infthor-eval show results/oracle/RUN results/blind/RUN --full")
 @click.argument("paths", metavar="RUN|TRAJECTORY...", nargs=-1, required=True, type=PATH)
 @sample_options
 @click.option(

@@ -4,8 +4,9 @@ from pathlib import Path
 
 import click
 
-from infthor_eval.cli.help import ExampleCommand, ExampleGroup
+from infthor_eval.cli.help import ExampleGroup
 from infthor_eval.cli.options.values import PATH, SET
+from infthor_eval.cli.progress.notes import print_left_out, print_refused
 
 
 @click.group("table", cls=ExampleGroup, example="infthor-eval table 4 SET")
@@ -13,7 +14,7 @@ def command() -> None:
     """Compute a table of the paper from its published files."""
 
 
-@command.command("4", cls=ExampleCommand, example="infthor-eval table 4 SET")
+@command.command("4", example="infthor-eval table 4 SET")
 @click.argument("set_folder", metavar="SET", type=SET)
 def table4(set_folder: Path) -> None:
     """Compute the paper's Table 4 from the scores in the published question files, beside the
@@ -21,7 +22,6 @@ def table4(set_folder: Path) -> None:
 
     SET is a folder with both files. It needs no frames.
     """
-    from infthor_eval.cli.progress.notes import print_left_out
     from infthor_eval.formats.nieh_set import NiehSet
     from infthor_eval.nieh.published import table4 as published
     from infthor_eval.report.terminal import print_table, table_console
@@ -31,9 +31,7 @@ def table4(set_folder: Path) -> None:
     print_table(published.table4(data), table_console())
 
 
-@command.command(
-    "final", cls=ExampleCommand, example="infthor-eval table final LOGS/eval_longhrz_*.log"
-)
+@command.command("final", example="infthor-eval table final LOGS/eval_longhrz_*.log")
 @click.argument("logs", metavar="LOG...", nargs=-1, required=True, type=PATH)
 def table_final(logs: tuple[Path, ...]) -> int:
     """Compute the paper's table of final long-horizon tasks from the published plan logs, beside
@@ -42,7 +40,6 @@ def table_final(logs: tuple[Path, ...]) -> int:
     The name of a LOG says which row it is; a log of another name has a row of its own. A line
     without counts is counted and named; the exit code is then 1.
     """
-    from infthor_eval.cli.progress.notes import print_refused
     from infthor_eval.formats.plan_logs import read_plan_log
     from infthor_eval.plans.published.final_table import final_table
     from infthor_eval.report.terminal import print_table, table_console

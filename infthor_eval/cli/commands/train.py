@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from infthor_eval.cli.help import ExampleCommand
+from infthor_eval.cli.help import example_command
 from infthor_eval.cli.options.values import PATH, FiniteFloat, parse_model_args, parse_pairs
 from infthor_eval.cli.progress.bar import StepBars
 from infthor_eval.cli.progress.notes import NOTES, print_note
@@ -25,11 +25,7 @@ _GPUS = 8
 _TFLOPS = 400.0
 
 
-@click.command(
-    "train",
-    cls=ExampleCommand,
-    example="infthor-eval train --recipe questions --data SET --out runs/mine",
-)
+@example_command("train", "infthor-eval train --recipe questions --data SET --out runs/mine")
 @click.option(
     "--recipe",
     "name",

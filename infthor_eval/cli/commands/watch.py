@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from infthor_eval.cli.help import ExampleCommand
-from infthor_eval.cli.options.values import PATH, FiniteFloat
+from infthor_eval.cli.help import example_command
+from infthor_eval.cli.options.values import PATH, FiniteFloat, default_option
+from infthor_eval.errors import UsageError, wrap_errors
+from infthor_eval.storage.files import file_name, prepare_file, write_atomically
 
 if TYPE_CHECKING:
     from PIL import Image
@@ -21,11 +23,9 @@ if TYPE_CHECKING:
 _FOLDER = Path("results/recordings")
 
 
-@click.command(
+@example_command(
     "watch",
-    cls=ExampleCommand,
-    example="infthor-eval watch results/scripted/RUN --trajectory kitchen-4-seed0 --out "
-    "scripted.mp4",
+    "infthor-eval watch results/scripted/RUN --trajectory kitchen-4-seed0 --out scripted.mp4",
 )
 @click.argument("run", type=PATH)
 @click.option("--trajectory", metavar="NAME", help="A trajectory of the run, if it has several.")
@@ -56,13 +56,7 @@ _FOLDER = Path("results/recordings")
 @click.option(
     "--scenes", type=PATH, help="Folder with recorded floor plans (thor_scenes/), as for the run."
 )
-@click.option(
-    "--fps",
-    type=FiniteFloat(0, 30, min_open=True),
-    default=2.0,
-    show_default=True,
-    help="Actions shown in a second.",
-)
+@default_option("--fps", FiniteFloat(0, 30, min_open=True), 2.0, "Actions shown in a second.")
 def command(
     run: Path,
     trajectory: str | None,
@@ -81,11 +75,9 @@ def command(
     the simulator of the run. Where an action ends otherwise than recorded, a line says so.
     """
     from infthor_eval.cli.progress.notes import print_failure
-    from infthor_eval.errors import UsageError
     from infthor_eval.formats.pictures.animations import require_animation_name
     from infthor_eval.report.presenter import EpisodeSelection
     from infthor_eval.run import open_runs
-    from infthor_eval.storage.files import prepare_file
 
     if out is not None:
         require_animation_name(out)
@@ -106,7 +98,6 @@ def command(
 
 
 def _require_replay(run: Run) -> Replay:
-    from infthor_eval.errors import UsageError
     from infthor_eval.suites import find_presenter, suite_names
 
     if run.presenter.replay is None:
@@ -121,8 +112,6 @@ def _require_replay(run: Run) -> Replay:
 
 def _refuse_options(run: Run, replay: Replay, options: Mapping[str, object]) -> None:
     """Refuse options that are given and that the suite of a run does not have."""
-    from infthor_eval.errors import UsageError
-
     for option, value in options.items():
         if value is not None and option not in replay.options:
             raise UsageError(
@@ -133,8 +122,6 @@ def _refuse_options(run: Run, replay: Replay, options: Mapping[str, object]) -> 
 
 def _default_file(parts: Sequence[str]) -> Path:
     """Return a file of its own for each choice."""
-    from infthor_eval.storage.files import file_name
-
     return _FOLDER / f"{file_name('-'.join(parts))}.mp4"
 
 
@@ -181,9 +168,6 @@ def _watch_frames(
 
 
 def _write_sheet(path: Path, sheet: Image.Image) -> None:
-    from infthor_eval.errors import wrap_errors
-    from infthor_eval.storage.files import write_atomically
-
     with (
         wrap_errors(f"{path}: cannot be written", "give another --sheet"),
         write_atomically(path) as partial,

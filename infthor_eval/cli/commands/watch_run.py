@@ -5,13 +5,11 @@ from pathlib import Path
 
 import click
 
-from infthor_eval.cli.help import ExampleCommand
+from infthor_eval.cli.help import example_command
 from infthor_eval.cli.options.values import PATH
 
 
-@click.command(
-    "watch-run", cls=ExampleCommand, example="infthor-eval watch-run results/qwen2.5-vl-nano"
-)
+@example_command("watch-run", "infthor-eval watch-run results/qwen2.5-vl-nano")
 @click.argument("run", type=PATH)
 @click.option(
     "--port",

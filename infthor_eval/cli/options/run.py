@@ -23,6 +23,7 @@ from infthor_eval.cli.options.values import (
     ModelList,
     ModelSpec,
     WholeNumber,
+    default_option,
     include_option,
     output_option,
     split_names,
@@ -114,13 +115,7 @@ _OPTIONS = (
         "command takes the first N instead.",
     ),
     output_option,
-    click.option(
-        "--seed",
-        type=WholeNumber(),
-        default=0,
-        show_default=True,
-        help="Seed of everything random.",
-    ),
+    default_option("--seed", WholeNumber(), 0, "Seed of everything random."),
     click.option(
         "--fresh",
         is_flag=True,

@@ -2,15 +2,16 @@
 
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import click
 
 from infthor_eval.errors import UsageError, unknown_name
 from model_adapters.options.parsing import read_pairs
 
+Command = TypeVar("Command", bound=Callable[..., Any])
 PATH = click.Path(path_type=Path)
 
 
@@ -55,6 +56,13 @@ include_option = click.option(
     multiple=True,
     help="Folder with your own task files; may be repeated.",
 )
+
+
+def default_option(
+    name: str, kind: click.ParamType, default: Any, help: str
+) -> Callable[[Command], Command]:
+    """Return an option whose help ends with its default."""
+    return click.option(name, type=kind, default=default, show_default=True, help=help)
 
 
 class ModelSpec(NamedTuple):

@@ -5,6 +5,7 @@ from typing import Any
 
 import click
 
+from infthor_eval.cli.options.values import default_option
 from infthor_eval.workers import WorkerSettings
 
 _MAX_WORKERS = 4096
@@ -23,11 +24,10 @@ def worker_options(command: Callable[..., Any]) -> Callable[..., Any]:
             metavar="ADDRESS",
             help='Run the workers on this Ray cluster ("auto": on this machine).',
         ),
-        click.option(
+        default_option(
             "--workers",
-            type=click.IntRange(1, _MAX_WORKERS),
+            click.IntRange(1, _MAX_WORKERS),
             default=1,
-            show_default=True,
             help="Processes that share the work; the results are the same.",
         ),
     ):

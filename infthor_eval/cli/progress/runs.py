@@ -10,14 +10,7 @@ from infthor_eval.cli.progress.bar import PacedBar
 from infthor_eval.cli.progress.notes import NOTES, print_note, prints_as_notes
 from infthor_eval.cli.progress.stopping import Stop, stop_on_sigint
 from infthor_eval.reasons import count_reasons
-from infthor_eval.runs import (
-    PreparedRun,
-    RunOutcome,
-    UnitRecord,
-    Workload,
-    check_runs,
-    execute,
-)
+from infthor_eval.runs import PreparedRun, RunOutcome, UnitRecord, Workload, check_runs, execute
 from infthor_eval.terminal import progress_bar
 
 

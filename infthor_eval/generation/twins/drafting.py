@@ -29,12 +29,7 @@ from infthor_eval.generation.twins.pairing import (
 from infthor_eval.generation.twins.pictures import are_clearly_unlike
 from infthor_eval.generation.twins.replays import WORLD, Replayed, Replays
 from infthor_eval.generation.twins.rewriting import without_traces
-from infthor_eval.generation.twins.rungs import (
-    farthest_first,
-    ladders,
-    stretches,
-    that_stay,
-)
+from infthor_eval.generation.twins.rungs import farthest_first, ladders, stretches, that_stay
 from infthor_eval.generation.twins.tolerance import tolerance_of
 from infthor_eval.household.wording import canonical_type
 from infthor_eval.storage.digests import digest
@@ -60,16 +55,15 @@ class TwinSettings(msgspec.Struct, frozen=True):
     rungs: tuple[int, ...] = ()
 
 
-class TwinDraft(msgspec.Struct):
-    """The twins of one trajectory.
+class Draft(msgspec.Struct):
+    """What was made of one trajectory.
 
     Attributes:
         digest: hash of the trajectory's JSON.
-        settings: how they were made.
+        settings: how it was made.
         rooms: scene of the trajectory.
         proposed: number of proposed edits by kind.
         rejected: number of rejected edits by kind and reason.
-        pairs: what was kept and has questions.
     """
 
     digest: str
@@ -77,6 +71,11 @@ class TwinDraft(msgspec.Struct):
     rooms: str
     proposed: dict[str, int] = msgspec.field(default_factory=dict)
     rejected: dict[str, dict[str, int]] = msgspec.field(default_factory=dict)
+
+
+class TwinDraft(Draft):
+    """The twins of one trajectory; `pairs` are those that were kept and have questions."""
+
     pairs: list[TwinPair] = msgspec.field(default_factory=list)
 
 

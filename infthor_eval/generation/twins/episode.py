@@ -13,7 +13,6 @@ from infthor_eval.thor.view import SimulatorView, ThorObject
 
 # What people would ask about as open or closed, and what can stand open without a hand on it.
 ASKED_OPEN = open_state.CONTAINERS | {"Laptop"}
-_HINT = "give a trajectory that replays here"
 
 
 @dataclass(frozen=True)

@@ -24,11 +24,7 @@ from infthor_eval.generation.replay import ActionReplay, ReplayReport
 from infthor_eval.generation.rollout import Rollout
 from infthor_eval.generation.trace import ExecutedAction, RolloutError, Trace
 from infthor_eval.generation.twins.comparison import Difference, compare
-from infthor_eval.generation.twins.drafting import (
-    TwinSettings,
-    is_flipped,
-    name_worlds,
-)
+from infthor_eval.generation.twins.drafting import Draft, TwinSettings, is_flipped, name_worlds
 from infthor_eval.generation.twins.episode import Episode
 from infthor_eval.generation.twins.exchanges import Exchange
 from infthor_eval.generation.twins.final_places import Errand, are_apart, errands, place_in
@@ -58,23 +54,9 @@ _HORIZONS = (0.0, 30.0)
 _MIN_PIXELS = 45  # of 90,000: half of what counts as shown
 
 
-class FinalTaskDraft(msgspec.Struct):
-    """The twins for agents of one trajectory.
+class FinalTaskDraft(Draft):
+    """The twins for agents of one trajectory; `worlds` are the names of both of each pair."""
 
-    Attributes:
-        digest: hash of the trajectory's JSON.
-        settings: how they were made.
-        rooms: scene of the trajectory.
-        proposed: number of proposed edits by kind.
-        rejected: number of rejected edits by kind and reason.
-        worlds: names of the two trajectories of each pair.
-    """
-
-    digest: str
-    settings: TwinSettings
-    rooms: str
-    proposed: dict[str, int] = msgspec.field(default_factory=dict)
-    rejected: dict[str, dict[str, int]] = msgspec.field(default_factory=dict)
     worlds: list[tuple[str, str]] = msgspec.field(default_factory=list)
 
 

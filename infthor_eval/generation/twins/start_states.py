@@ -31,13 +31,8 @@ def _with_states(trajectory: Trajectory, *states: StartState) -> Trajectory:
 
 
 @dataclass(frozen=True)
-class _Opening:
-    """One of two objects is open for closed or closed for open, against the episode.
-
-    Attributes:
-        one: the object that is asked about.
-        other: another one, so that neither world is the episode's own.
-    """
+class _OfTwo:
+    """An edit of two objects at the start."""
 
     one: ThorObject
     other: ThorObject
@@ -47,6 +42,16 @@ class _Opening:
     def keys(self) -> frozenset[str]:
         """See `Proposal`."""
         return frozenset({self.one.object_id, self.other.object_id})
+
+
+@dataclass(frozen=True)
+class _Opening(_OfTwo):
+    """One of two objects is open for closed or closed for open, against the episode.
+
+    Attributes:
+        one: the object that is asked about.
+        other: another one, so that neither world is the episode's own.
+    """
 
     def apply(self, episode: Episode, simulator: Simulator) -> Worlds:
         """See `Proposal`."""
@@ -59,11 +64,10 @@ class _Opening:
                     *(StartState(name, is_open=state) for name, state in sorted(states.items())),
                 )
             )
-        both = {self.one.object_id, self.other.object_id}
-        inside = {key for holder in both for key in episode.inside(holder)}
+        inside = {key for holder in self.keys for key in episode.inside(holder)}
         return Worlds(
             pair=(worlds[0], worlds[1]),
-            changed=frozenset(both | inside),
+            changed=self.keys | inside,
             types=frozenset({self.one.object_type, self.other.object_type}),
         )
 
@@ -107,22 +111,13 @@ class Opened:
 
 
 @dataclass(frozen=True)
-class _Replacement:
+class _Replacement(_OfTwo):
     """At one place stands one of two objects; the other one is not in the scene at all.
 
     Attributes:
         one: an object at its place in the episode.
         other: the object that stands there in the second world.
     """
-
-    one: ThorObject
-    other: ThorObject
-    index: ClassVar[int] = 0
-
-    @property
-    def keys(self) -> frozenset[str]:
-        """See `Proposal`."""
-        return frozenset({self.one.object_id, self.other.object_id})
 
     def apply(self, episode: Episode, simulator: Simulator) -> Worlds:
         """See `Proposal`: the place where the second object was is empty in both worlds.

@@ -30,7 +30,7 @@ from infthor_eval.generation.simulator_jobs import (
     collect_outcomes,
     freeze_existing_objects,
 )
-from infthor_eval.generation.twins.drafting import TwinDraft, TwinSettings, draft_twins
+from infthor_eval.generation.twins.drafting import Draft, TwinDraft, TwinSettings, draft_twins
 from infthor_eval.generation.twins.final_tasks import (
     TRAJECTORIES,
     FinalTaskDraft,
@@ -85,15 +85,28 @@ class _ChosenQuestion:
         return [it.moment - evidence for it in self.rungs if it.moment is not None]
 
 
-class TwinSummary(msgspec.Struct):
-    """Numbers of a set of twins, as `--json` prints them.
+class _EditNumbers(msgspec.Struct):
+    """What every set of twins counts.
 
     Attributes:
         trajectories: number of trajectories that twins were made of.
         resumed: number of these of earlier runs.
         proposed: number of proposed edits by kind.
-        kept: number of those that are twins, by kind.
+        kept: number of those that became twins, by kind.
         rejected: number of the others by reason.
+    """
+
+    trajectories: int
+    resumed: int
+    proposed: dict[str, int]
+    kept: dict[str, int]
+    rejected: dict[str, int]
+
+
+class TwinSummary(_EditNumbers):
+    """Numbers of a set of twins, as `--json` prints them.
+
+    Attributes:
         found: number of paired questions before the choice.
         pairs: number of paired questions in the set.
         facts: number of facts that they are about.
@@ -106,11 +119,6 @@ class TwinSummary(msgspec.Struct):
         seconds: wall time of this run.
     """
 
-    trajectories: int
-    resumed: int
-    proposed: dict[str, int]
-    kept: dict[str, int]
-    rejected: dict[str, int]
     found: int
     pairs: int
     facts: int
@@ -326,25 +334,15 @@ def _without_excess(chosen: Iterable[_ChosenQuestion]) -> list[_ChosenQuestion]:
     return kept
 
 
-class FinalTaskSummary(msgspec.Struct):
+class FinalTaskSummary(_EditNumbers):
     """Numbers of a set of twins for agents, as `--json` prints them.
 
     Attributes:
-        trajectories: number of trajectories that twins were made of.
-        resumed: number of these of earlier runs.
-        proposed: number of proposed edits by kind.
-        kept: number of those that became a pair, by kind.
-        rejected: number of the others by reason.
         pairs: number of pairs.
         failures: trajectories that twins cannot be made of, one line each.
         seconds: wall time of this run.
     """
 
-    trajectories: int
-    resumed: int
-    proposed: dict[str, int]
-    kept: dict[str, int]
-    rejected: dict[str, int]
     pairs: int
     failures: list[str]
     seconds: float
@@ -431,7 +429,7 @@ def _failure_line(item: _Item, error: InfthorError) -> str:
 
 
 def _count_edits(
-    drafts: Iterable[TwinDraft | FinalTaskDraft],
+    drafts: Iterable[Draft],
 ) -> tuple[dict[str, int], dict[str, int], dict[str, int]]:
     """Return the numbers of edits proposed and kept by kind, and of those rejected by reason."""
     proposed = Counter[str]()

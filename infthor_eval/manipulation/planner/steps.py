@@ -123,15 +123,10 @@ def _approach(environment: ArmEnvironment, target: str) -> Iterator[Call]:
     for shift in _SHIFTS:
         goal = middle_of(environment.view.objects[target])
         share = ArmStand.of(environment.view.agent).share(goal[1] + shift)
-        yield {"action": "MoveArmBase", "y": share, "returnToStart": False}
+        yield _move_base(share)
         for _ in range(2):
             yield _aim(environment.view, goal)
-            yield {
-                "action": "MoveArm",
-                "position": xyz(_wrist_before(environment.view, goal)),
-                "coordinateSpace": "world",
-                "returnToStart": False,
-            }
+            yield _move_wrist(_wrist_before(environment.view, goal))
         yield {"action": "Pass"}
 
 
@@ -143,11 +138,28 @@ def _aim(view: SimulatorView, goal: Point) -> Call:
     aim = offset(wrist, goal)
     yaw = math.degrees(math.atan2(aim[0], aim[2]) - math.atan2(now[0], now[2]))
     pitch = math.degrees(_elevation(now) - _elevation(aim))
+    return _turn_wrist(pitch, yaw, 0.0)
+
+
+def _move_base(share: float) -> Call:
+    return {"action": "MoveArmBase", "y": share, "returnToStart": False}
+
+
+def _move_wrist(place: Point) -> Call:
+    return {
+        "action": "MoveArm",
+        "position": xyz(place),
+        "coordinateSpace": "world",
+        "returnToStart": False,
+    }
+
+
+def _turn_wrist(pitch: float, yaw: float, roll: float) -> Call:
     return {
         "action": "RotateWristRelative",
         "pitch": pitch,
         "yaw": yaw,
-        "roll": 0.0,
+        "roll": roll,
         "returnToStart": False,
     }
 
@@ -232,27 +244,11 @@ class _PutTask:
     def call(self, move: ArmMove) -> Call:
         """Return a movement as a call of AI2-THOR's."""
         if move.kind == MoveKind.LIFT:
-            return {
-                "action": "MoveArmBase",
-                "y": self._stand.share(float(move.pose.bases[0])),
-                "returnToStart": False,
-            }
+            return _move_base(self._stand.share(float(move.pose.bases[0])))
         if move.kind == MoveKind.REACH:
             x, y, z = move.pose.world()[0].tolist()
-            return {
-                "action": "MoveArm",
-                "position": xyz((x, y, z)),
-                "coordinateSpace": "world",
-                "returnToStart": False,
-            }
-        pitch, yaw, roll = angles_of(self._linkage.now.turns[0].T @ move.pose.turns[0])
-        return {
-            "action": "RotateWristRelative",
-            "pitch": pitch,
-            "yaw": yaw,
-            "roll": roll,
-            "returnToStart": False,
-        }
+            return _move_wrist((x, y, z))
+        return _turn_wrist(*angles_of(self._linkage.now.turns[0].T @ move.pose.turns[0]))
 
     def has_reached(self, move: ArmMove) -> bool:
         """Return whether the arm is where a movement was to bring it; a collision is remembered."""

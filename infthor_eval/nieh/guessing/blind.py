@@ -17,12 +17,7 @@ from infthor_eval.formats.reading import NOT_JSON
 from infthor_eval.nieh import numbers, scoring
 from infthor_eval.nieh.contexts import QuestionVariant
 from infthor_eval.nieh.guessing.chains import form_of
-from infthor_eval.nieh.guessing.guessers import (
-    GUESSERS,
-    Knowledge,
-    NamedGuesser,
-    blind_guesser,
-)
+from infthor_eval.nieh.guessing.guessers import GUESSERS, Knowledge, NamedGuesser, blind_guesser
 from infthor_eval.nieh.records import BlindGuess
 from infthor_eval.nieh.scoring import score, scores
 from infthor_eval.storage.digests import digest_of_files, fingerprint

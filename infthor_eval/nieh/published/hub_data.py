@@ -44,10 +44,7 @@ def fetch_nieh(folder: Path, token: str | None = None, endpoint: str | None = No
 def _download(folder: Path, token: str | None, endpoint: str | None) -> None:
     from huggingface_hub import HfApi, snapshot_download
     from huggingface_hub.constants import DEFAULT_REVISION
-    from huggingface_hub.errors import (
-        GatedRepoError,
-        RepositoryNotFoundError,
-    )
+    from huggingface_hub.errors import GatedRepoError, RepositoryNotFoundError
 
     try:
         # A download takes what is in the folder for the data if the hub does not answer.

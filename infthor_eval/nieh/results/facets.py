@@ -7,14 +7,7 @@ page, in the table of samples, and in exports.
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
-from infthor_eval.distances import (
-    AGES,
-    DISTANCES,
-    LENGTHS,
-    age_class,
-    distance_class,
-    length_class,
-)
+from infthor_eval.distances import AGES, DISTANCES, LENGTHS, age_class, distance_class, length_class
 from infthor_eval.facets import Facet
 from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.runs import UnitRecord

@@ -9,12 +9,7 @@ from msgspec.structs import replace
 from infthor_eval.nieh.config import NiehConfig
 from infthor_eval.nieh.results.cells import mean_cell, score_interval
 from infthor_eval.nieh.results.facets import SHOWN_CLUES
-from infthor_eval.nieh.results.gains import (
-    Gain,
-    difference_cell,
-    gain_cell,
-    paired_gain,
-)
+from infthor_eval.nieh.results.gains import Gain, difference_cell, gain_cell, paired_gain
 from infthor_eval.nieh.results.memory_summary import subject_of
 from infthor_eval.nieh.results.summary import NiehSummary, TaskSummary, main_metric
 from infthor_eval.runs import RunSummary

@@ -11,14 +11,7 @@ from typing import NamedTuple
 
 import msgspec
 
-from infthor_eval.distances import (
-    AGES,
-    DISTANCES,
-    LENGTHS,
-    age_class,
-    distance_class,
-    length_class,
-)
+from infthor_eval.distances import AGES, DISTANCES, LENGTHS, age_class, distance_class, length_class
 from infthor_eval.facets import Facet
 from infthor_eval.nieh.records import NiehAnswer, TwinSide
 from infthor_eval.nieh.results.retention import Ladder, Retention, retention_of

@@ -222,7 +222,7 @@ def _embedded(success: SuccessByRadius) -> tuple[str, ...]:
 
 
 class ManipulationPresenter(PlainPresenter):
-    """See `Presenter`."""
+    """See `PlainPresenter`."""
 
     title = "Pick-ups and puts"
     measure = "successful episodes"
@@ -240,16 +240,16 @@ class ManipulationPresenter(PlainPresenter):
     }
 
     def is_share(self, metric: str, scores: Sequence[float]) -> bool:
-        """See `Presenter.is_share`."""
+        """See `PlainPresenter.is_share`."""
         return metric == self.main_metric
 
     def bounds(self, metric: str) -> tuple[float, float]:
-        """See `Presenter.bounds`: a reward has none."""
+        """See `PlainPresenter.bounds`: a reward has none."""
         return (0.0, 1.0) if metric == self.main_metric else (-math.inf, math.inf)
 
     def sections(self, runs: Sequence[Run]) -> Iterator[Section]:
-        """See `Presenter.sections`: reward along trajectories, and success by radius where there
-        are several radii."""
+        """See `PlainPresenter.sections`: reward along trajectories, and success by radius where
+        there are several radii."""
 
         def radii_on_page() -> tuple[Sequence[Chart], Table]:
             success = success_by_radius(_model_runs(runs))
@@ -263,7 +263,7 @@ class ManipulationPresenter(PlainPresenter):
             yield figure_section("arm-radius", "Success by the hand's radius", radii_on_page)
 
     def describe(self, record: Record) -> Description:
-        """See `Presenter.describe`."""
+        """See `PlainPresenter.describe`."""
         payload = record.payload
         target = " → ".join(
             name for name in (payload.object_id, payload.receptacle_id) if name is not None
@@ -271,15 +271,15 @@ class ManipulationPresenter(PlainPresenter):
         return Description(payload.instruction, target, payload.kind)
 
     def reply(self, record: Record) -> str:
-        """See `Presenter.reply`: how the episode ended."""
+        """See `PlainPresenter.reply`: how the episode ended."""
         return record.payload.ended
 
     def details(self, record: Record) -> Mapping[str, str]:
-        """See `Presenter.details`: the page shows all of it elsewhere."""
+        """See `PlainPresenter.details`: the page shows all of it elsewhere."""
         return {}
 
     def steps(self, record: Record) -> list[StepRow]:
-        """See `Presenter.steps`."""
+        """See `PlainPresenter.steps`."""
         return [_step_row(step) for step in record.payload.steps]
 
 

@@ -46,7 +46,7 @@ _BOUNDS = {
 
 
 class NiehPresenter(PlainPresenter):
-    """See `Presenter`."""
+    """See `PlainPresenter`."""
 
     title = "Questions"
     measure = "questions right"
@@ -63,16 +63,16 @@ class NiehPresenter(PlainPresenter):
     }
 
     def measure_of(self, task: str, summary: NiehSummary) -> str:
-        """See `Presenter.measure_of`: of twins, pairs count."""
+        """See `PlainPresenter.measure_of`: of twins, pairs count."""
         return self.measure if summary.tasks[task].pairs is None else NET_PAIRS
 
     def finding_of(self, task: str, summary: NiehSummary) -> str:
-        """See `Presenter.finding_of`."""
+        """See `PlainPresenter.finding_of`."""
         return self.finding if summary.tasks[task].pairs is None else PAIRS_FINDING
 
     def chance(self, task: str, summary: NiehSummary, records: Sequence[Record]) -> float | None:
-        """See `Presenter.chance`: of questions that of `blind`; who does not know which world of
-        a pair is which has 0 net pairs on average."""
+        """See `PlainPresenter.chance`: of questions that of `blind`; who does not know which world
+        of a pair is which has 0 net pairs on average."""
         of_task = summary.tasks[task]
         if of_task.pairs is not None:
             return 0.0
@@ -86,16 +86,16 @@ class NiehPresenter(PlainPresenter):
         return fmean(known) if known and len(known) == len(scores) else None
 
     def is_share(self, metric: str, scores: Sequence[float]) -> bool:
-        """See `Presenter.is_share`: all of them, although the reference scorer can exceed 1."""
+        """See `PlainPresenter.is_share`: all are, although the reference scorer can exceed 1."""
         return True
 
     def bounds(self, metric: str) -> tuple[float, float]:
-        """See `Presenter.bounds`: the reference scorer exceeds 1 on repetitions; scores above
+        """See `PlainPresenter.bounds`: the reference scorer exceeds 1 on repetitions; scores above
         `blind`, of a part of a set, can be anything, and so can a task's own metrics."""
         return _BOUNDS.get(metric.partition(_AT_AGE)[0], (-math.inf, math.inf))
 
     def extra_scores(self, record: Record) -> Mapping[str, float]:
-        """See `Presenter.extra_scores`: scores above `blind` where that does not solve all."""
+        """See `PlainPresenter.extra_scores`: scores above `blind` where that does not solve all."""
         scores = {scorer: score_above_blind(record.payload, scorer) for scorer in SCORERS}
         return {
             f"{scorer}{_ABOVE_BLIND}": score
@@ -104,14 +104,14 @@ class NiehPresenter(PlainPresenter):
         }
 
     def extra_ranges(self, record: Record) -> Mapping[str, tuple[float, float]]:
-        """See `Presenter.extra_ranges`."""
+        """See `PlainPresenter.extra_ranges`."""
         counted = [
             scorer for scorer in SCORERS if f"{scorer}{_ABOVE_BLIND}" in self.extra_scores(record)
         ]
         return {f"{scorer}{_ABOVE_BLIND}": score_range([record], scorer) for scorer in counted}
 
     def explain(self, record: Record) -> list[str]:
-        """See `Presenter.explain`: what each of our scorers finds in the reply."""
+        """See `PlainPresenter.explain`: what each of our scorers finds in the reply."""
         from infthor_eval.nieh.explaining import explain
 
         if record.payload.reply is None:
@@ -120,12 +120,12 @@ class NiehPresenter(PlainPresenter):
         return explain(record.payload.reply, record.payload.answers, scorers)
 
     def group(self, record: Record) -> str:
-        """See `Presenter.group`: the pair of a question of twins."""
+        """See `PlainPresenter.group`: the pair of a question of twins."""
         twin = record.payload.twin
         return "" if twin is None else twin.pair
 
     def group_scores(self, records: Sequence[Record]) -> Iterator[GroupScore]:
-        """See `Presenter.group_scores`: net pairs of twins, at moments also those of each age."""
+        """See `PlainPresenter.group_scores`: net pairs of twins, at moments also of each age."""
         ages = {
             record.payload.twin.pair: age_class(record.payload.twin.age)
             for record in records
@@ -144,20 +144,20 @@ class NiehPresenter(PlainPresenter):
                 yield GroupScore(name, group, pair.cluster, pair.shares.net)
 
     def opening(self, runs: Sequence[Run]) -> Section | None:
-        """See `Presenter.opening`: pairs of twins, if there are any."""
+        """See `PlainPresenter.opening`: pairs of twins, if there are any."""
         tables = pair_tables([run.summary for run in runs])
         if not tables:
             return None
         return Section("pairs", "Pairs of twins", memory_curves(runs), tuple(tables))
 
     def charts(self, runs: Sequence[Run]) -> list[Chart]:
-        """See `Presenter.charts`."""
+        """See `PlainPresenter.charts`."""
         from infthor_eval.report.suites.nieh_charts import nieh_charts
 
         return nieh_charts(runs)
 
     def describe(self, record: Record) -> Description:
-        """See `Presenter.describe`."""
+        """See `PlainPresenter.describe`."""
         payload = record.payload
         target = ", ".join(map(str, payload.answers))
         return Description(
@@ -165,16 +165,16 @@ class NiehPresenter(PlainPresenter):
         )
 
     def reply(self, record: Record) -> str:
-        """See `Presenter.reply`."""
+        """See `PlainPresenter.reply`."""
         return record.payload.reply or ""
 
     def reply_tokens(self, record: Record) -> ReplyTokens | None:
-        """See `Presenter.reply_tokens`."""
+        """See `PlainPresenter.reply_tokens`."""
         payload = record.payload
         return ReplyTokens(payload.reply_ids, payload.margins) if payload.margins else None
 
     def details(self, record: Record) -> Mapping[str, str]:
-        """See `Presenter.details`: evidence, `blind` and thoughts; the rest is elsewhere."""
+        """See `PlainPresenter.details`: evidence, `blind` and thoughts; the rest is elsewhere."""
         payload = record.payload
         details: dict[str, str] = {}
         if payload.moment is not None:
@@ -194,12 +194,12 @@ class NiehPresenter(PlainPresenter):
         return details
 
     def recalled(self, record: Record) -> Sequence[int | str]:
-        """See `Presenter.recalled`."""
+        """See `PlainPresenter.recalled`."""
         recall = record.payload.recall
         return () if recall is None else recall.recalled
 
     def request_frames(self, run: Run, data: Path | None) -> FindFrames:
-        """See `Presenter.request_frames`."""
+        """See `PlainPresenter.request_frames`."""
         from infthor_eval.report.suites.nieh_frames import RequestFrames
 
         return RequestFrames(run, data)
@@ -207,7 +207,7 @@ class NiehPresenter(PlainPresenter):
     def timelines(
         self, runs: Sequence[Run], data: Path | None, thumbnails: ThumbnailStore
     ) -> Timelines:
-        """See `Presenter.timelines`."""
+        """See `PlainPresenter.timelines`."""
         from infthor_eval.report.suites.nieh_frames import find_timelines
 
         return find_timelines(runs, data, thumbnails)

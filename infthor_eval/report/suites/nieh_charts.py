@@ -10,11 +10,7 @@ from infthor_eval.nieh.results.cells import Cell, mean_cell
 from infthor_eval.nieh.results.evidence_tables import facet_cells, short_name
 from infthor_eval.nieh.results.facets import DEPTH, FACETS, QuestionFacet
 from infthor_eval.nieh.results.gains import find_gains
-from infthor_eval.nieh.results.summary import (
-    CLUE_COLUMNS,
-    TaskSummary,
-    main_metric,
-)
+from infthor_eval.nieh.results.summary import CLUE_COLUMNS, TaskSummary, main_metric
 from infthor_eval.nieh.results.tables import by_depth
 from infthor_eval.rates import Rate
 from infthor_eval.report.charts import (

@@ -36,7 +36,7 @@ _DIFFERING = 6  # frames beside the clues that are shown of those that differ fr
 
 
 def find_timelines(runs: Sequence[Run], data: Path | None, thumbnails: ThumbnailStore) -> Timelines:
-    """See `Presenter.timelines`; a set that is missing or has changed since the run has a note.
+    """See `PlainPresenter.timelines`; a set that is missing or has changed since has a note.
 
     Clues of all questions get their pictures before any neighbour does, as there is a limit on the
     size of all.
@@ -240,7 +240,7 @@ class RunSets:
 
 
 class RequestFrames:
-    """Finds the frames of a run's requests; see `Presenter.request_frames`."""
+    """Finds the frames of a run's requests; see `PlainPresenter.request_frames`."""
 
     def __init__(self, run: Run, data: Path | None) -> None:
         sets = RunSets([run], data)

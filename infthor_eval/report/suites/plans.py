@@ -32,11 +32,7 @@ from infthor_eval.report.presenter import (
 from infthor_eval.report.recordings.plan_pictures import plan_pictures
 from infthor_eval.report.recordings.room_map import draw_map
 from infthor_eval.report.suites.episode_columns import PLAN_COLUMNS
-from infthor_eval.report.suites.reward_curves import (
-    curves_on_page,
-    curves_result,
-    figure_section,
-)
+from infthor_eval.report.suites.reward_curves import curves_on_page, curves_result, figure_section
 from infthor_eval.report.web.sections import Section
 from infthor_eval.run import Run
 from infthor_eval.runs import UnitRecord
@@ -103,7 +99,7 @@ def _build_figure_7(runs: Sequence[Run], request: FigureRequest) -> FigureResult
 
 
 class PlansPresenter(PlainPresenter):
-    """See `Presenter`."""
+    """See `PlainPresenter`."""
 
     title = "Plans"
     measure = "plans completed"
@@ -118,29 +114,29 @@ class PlansPresenter(PlainPresenter):
     }
 
     def is_share(self, metric: str, scores: Sequence[float]) -> bool:
-        """See `Presenter.is_share`."""
+        """See `PlainPresenter.is_share`."""
         return metric == self.main_metric or metric in PAIR_BOUNDS
 
     def bounds(self, metric: str) -> tuple[float, float]:
-        """See `Presenter.bounds`: only rewards have none."""
+        """See `PlainPresenter.bounds`: only rewards have none."""
         return (-math.inf, math.inf) if metric == "reward" else PAIR_BOUNDS.get(metric, (0.0, 1.0))
 
     def measure_of(self, task: str, summary: PlansSummary) -> str:
-        """See `Presenter.measure_of`: of twins, pairs count."""
+        """See `PlainPresenter.measure_of`: of twins, pairs count."""
         return self.measure if summary.tasks[task].twins is UNSET else NET_PAIRS
 
     def finding_of(self, task: str, summary: PlansSummary) -> str:
-        """See `Presenter.finding_of`."""
+        """See `PlainPresenter.finding_of`."""
         return self.finding if summary.tasks[task].twins is UNSET else PAIRS_FINDING
 
     def group_scores(self, records: Sequence[Record]) -> Iterator[GroupScore]:
-        """See `Presenter.group_scores`: net pairs of twins."""
+        """See `PlainPresenter.group_scores`: net pairs of twins."""
         for pair in score_pairs(records):
             for name, score in pair.shares.by_metric.items():
                 yield GroupScore(name, pair.pair, pair.cluster, score)
 
     def sections(self, runs: Sequence[Run]) -> Iterator[Section]:
-        """See `Presenter.sections`: curves of reward for each task that all runs have."""
+        """See `PlainPresenter.sections`: curves of reward for each task that all runs have."""
 
         def task_curves(task: str) -> tuple[Sequence[Chart], Table]:
             return curves_on_page(plan_curves([_plans_run(run) for run in runs], task))
@@ -151,19 +147,19 @@ class PlansPresenter(PlainPresenter):
                 yield figure_section(f"rewards-{task}", title, partial(task_curves, task))
 
     def describe(self, record: Record) -> Description:
-        """See `Presenter.describe`."""
+        """See `PlainPresenter.describe`."""
         return Description(record.payload.plan, record.payload.goal, record.payload.kind)
 
     def reply(self, record: Record) -> str:
-        """See `Presenter.reply`: how the plan ended."""
+        """See `PlainPresenter.reply`: how the plan ended."""
         return record.payload.ended
 
     def details(self, record: Record) -> Mapping[str, str]:
-        """See `Presenter.details`: the page shows all of it elsewhere."""
+        """See `PlainPresenter.details`: the page shows all of it elsewhere."""
         return {}
 
     def steps(self, record: Record) -> list[StepRow]:
-        """See `Presenter.steps`."""
+        """See `PlainPresenter.steps`."""
         return [
             StepRow(
                 action=_action_text(step.action, step.call),

@@ -26,33 +26,33 @@ Record = UnitRecord[QuestionAnswer]
 
 
 class QuestionsPresenter(PlainPresenter):
-    """See `Presenter`: each question in words, and a chart of the scores by kind."""
+    """See `PlainPresenter`: each question in words, and a chart of the scores by kind."""
 
     target_label = "gold answer"
 
     def measure_of(self, task: str, summary: QuestionSummary) -> str:
-        """See `Presenter.measure_of`: the scorer's name."""
+        """See `PlainPresenter.measure_of`: the scorer's name."""
         return summary.metric
 
     def bounds(self, metric: str) -> tuple[float, float]:
-        """See `Presenter.bounds`."""
+        """See `PlainPresenter.bounds`."""
         return 0.0, 1.0
 
     def describe(self, record: Record) -> Description:
-        """See `Presenter.describe`."""
+        """See `PlainPresenter.describe`."""
         return Description(record.payload.question, record.payload.answer, record.payload.kind)
 
     def reply(self, record: Record) -> str:
-        """See `Presenter.reply`."""
+        """See `PlainPresenter.reply`."""
         return record.payload.reply or ""
 
     def details(self, record: Record) -> Mapping[str, str]:
-        """See `Presenter.details`: the thoughts, the description has all else."""
+        """See `PlainPresenter.details`: the thoughts, the description has all else."""
         thinking = record.payload.thinking
         return {} if thinking is None else {THOUGHT: thinking}
 
     def charts(self, runs: Sequence[Run]) -> list[Chart]:
-        """See `Presenter.charts`: scores by kind, a chart for each task."""
+        """See `PlainPresenter.charts`: scores by kind, a chart for each task."""
         tasks = dict.fromkeys(task for run in runs for task in run.summary.summary.tasks)
         charts = []
         for task in tasks:
@@ -61,7 +61,7 @@ class QuestionsPresenter(PlainPresenter):
         return charts
 
     def request_frames(self, run: Run, data: Path | None) -> FindFrames:
-        """See `Presenter.request_frames`."""
+        """See `PlainPresenter.request_frames`."""
         questions = cache(lambda task: _questions(run, task))
         return lambda record: (
             questions(record.task)[record.id].frames if record.payload.n_pictures else ()
@@ -70,7 +70,7 @@ class QuestionsPresenter(PlainPresenter):
     def timelines(
         self, runs: Sequence[Run], data: Path | None, thumbnails: ThumbnailStore
     ) -> Timelines:
-        """See `Presenter.timelines`: the pictures of each question."""
+        """See `PlainPresenter.timelines`: the pictures of each question."""
         frames: dict[UnitKey, Sequence[FrameRef]] = {}
         notes: dict[str, None] = {}
         for run in runs:

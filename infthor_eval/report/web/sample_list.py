@@ -37,7 +37,7 @@ class SuiteSamples(NamedTuple):
 
     Attributes:
         samples: samples of all units that have a record, in the order of their keys; those of a
-            group are one (`Presenter.group`).
+            group are one (`PlainPresenter.group`).
         notes: reasons why pictures are missing, a line each.
     """
 

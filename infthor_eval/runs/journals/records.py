@@ -54,6 +54,10 @@ class UnitKey(NamedTuple):
         return self._replace(repeat=1)
 
 
+class Typed(msgspec.Struct, frozen=True, omit_defaults=True, tag_field="type"):
+    """What a journal tells by its `type`, and writes without the values that are defaults."""
+
+
 class Tokens(msgspec.Struct, frozen=True, omit_defaults=True):
     """Tokens of requests, of those not encoded again, and of replies; None if not counted."""
 
@@ -103,15 +107,7 @@ class RunHeader(
         return name if frames in ("", "shown") else f"{name}, {frames} frames"
 
 
-class UnitRecord(
-    msgspec.Struct,
-    Generic[Payload],
-    frozen=True,
-    kw_only=True,
-    omit_defaults=True,
-    tag_field="type",
-    tag="unit",
-):
+class UnitRecord(Typed, Generic[Payload], frozen=True, kw_only=True, tag="unit"):
     """A unit that was evaluated, or the reason why it could not be.
 
     Attributes:
@@ -162,15 +158,7 @@ class UnitRecord(
         return state_of(self.failure, self.excluded, asked=self.asked)
 
 
-class ArtifactRecord(
-    msgspec.Struct,
-    Generic[Payload],
-    frozen=True,
-    kw_only=True,
-    omit_defaults=True,
-    tag_field="type",
-    tag="artifact",
-):
+class ArtifactRecord(Typed, Generic[Payload], frozen=True, kw_only=True, tag="artifact"):
     """A cached artifact: a suite's intermediate result, which a resumed run does not repeat.
 
     Attributes:

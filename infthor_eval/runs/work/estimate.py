@@ -17,12 +17,7 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from infthor_eval.runs.journals.record_encoder import RecordEncoder
-from infthor_eval.runs.journals.records import (
-    Payload,
-    SuiteUnit,
-    Unit,
-    UnitRecord,
-)
+from infthor_eval.runs.journals.records import Payload, SuiteUnit, Unit, UnitRecord
 from infthor_eval.runs.request import RunRequest, prepare
 from infthor_eval.runs.suite import BoundEvaluation, Group, Suite, Workload
 from infthor_eval.runs.usage import Usage

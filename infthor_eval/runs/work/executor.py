@@ -25,9 +25,6 @@ from infthor_eval.runs.work.batches import fetch_replies
 from infthor_eval.runs.work.binding import bind_run, group_records
 from model_adapters import BatchModel, PersonModel
 
-# A record that is on disk; True if an earlier run had put it there.
-Recorded = tuple[UnitRecord[Payload], bool]
-
 
 class Executor(Protocol[Payload]):
     """Does the work of a run. It is ready as soon as it is created."""

@@ -27,14 +27,7 @@ from infthor_eval.runs.request import PreparedRun
 from infthor_eval.runs.suite import Group, Workload
 from infthor_eval.runs.work.binding import bind_run, group_records
 from infthor_eval.terminal import print_error
-from infthor_eval.workers import (
-    Event,
-    JobFailed,
-    JobResult,
-    Pool,
-    WorkerLost,
-    WorkerWithdrawn,
-)
+from infthor_eval.workers import Event, JobFailed, JobResult, Pool, WorkerLost, WorkerWithdrawn
 
 _SHARD_WAIT_S = 20.0
 # A unit that kills its worker (out of memory, say) must not fail the others of its group: after so

@@ -20,7 +20,7 @@ _SHADES: tuple[Color, ...] = ((0.9, 0.85, 0.72), (0.75, 0.35, 0.3), (0.5, 0.6, 0
 def toaster(b: Builder) -> None:
     """A rounded box with two slots, glowing inside while on."""
     color = pick((STEEL, (0.7, 0.2, 0.18), WHITE), b.style)
-    b.box((0, 0, 0), (1, 0.92, 0.96), color, Material.METAL)
+    b.metal((0, 0, 0), (1, 0.92, 0.96), color)
     slot: Color = (1.0, 0.4, 0.1) if b.state.toggled else BLACK
     for side in (-1, 1):
         b.box(
@@ -34,8 +34,8 @@ def toaster(b: Builder) -> None:
 def coffee_machine(b: Builder) -> None:
     """A back with a tank, a head, a plate for the mug in front; while on, a stream and a light."""
     color = pick((BLACK, STEEL, (0.5, 0.15, 0.14)), b.style)
-    b.box((0, 0, -0.6), (0.9, 1, 0.4), color, Material.METAL)
-    b.box((0, 0.72, 0.1), (0.9, 0.28, 0.85), shade_of(color, 1.15), Material.METAL)
+    b.metal((0, 0, -0.6), (0.9, 1, 0.4), color)
+    b.metal((0, 0.72, 0.1), (0.9, 0.28, 0.85), shade_of(color, 1.15))
     b.box((0, 0.1, -1.0), (0.62, 0.7, 0.015), (0.5, 0.68, 0.76), Material.GLASS)
     for side in (-1, 1):
         b.box((side * 0.9, 0.1, -0.6), (0.02, 0.7, 0.22), (0.5, 0.68, 0.76), Material.GLASS)
@@ -86,14 +86,14 @@ def desktop(b: Builder) -> None:
 def laptop(b: Builder) -> None:
     """Keyboard and lid; the lid lies flat when closed."""
     if b.state.openness == 0:
-        b.box((0, -0.45, 0.1), (1, 0.55, 0.88), STEEL, Material.METAL)
-        b.box((0, 0.57, 0.1), (1, 0.43, 0.88), shade_of(STEEL, 0.9), Material.METAL)
+        b.metal((0, -0.45, 0.1), (1, 0.55, 0.88), STEEL)
+        b.metal((0, 0.57, 0.1), (1, 0.43, 0.88), shade_of(STEEL, 0.9))
         return
     y = b.thick(0.01, 1)
-    b.box((0, -1 + y, 0.1), (1, y, 0.88), STEEL, Material.METAL)
+    b.metal((0, -1 + y, 0.1), (1, y, 0.88), STEEL)
     b.box((0, -1 + 2 * y, 0.1), (0.88, 0.02, 0.5), DARK)
     z = b.thick(0.008, 2)
-    b.box((0, 0, -0.88), (1, 1, z), STEEL, Material.METAL)
+    b.metal((0, 0, -0.88), (1, 1, z), STEEL)
     b.coin(2, (0, 0.1, -0.88 - z), (0.14, 0.2, z * 0.3), WHITE)
     screen = _SCREEN if b.state.toggled else (0.07, 0.08, 0.1)
     b.box(
@@ -131,7 +131,7 @@ def _lamp(b: Builder, foot: float, shade_low: float) -> None:
 @draws
 def cell_phone(b: Builder) -> None:
     """A slab of glass in a bright metal edge: a round key, a slit for the ear; icons while on."""
-    b.box((0, -0.15, 0), (1, 0.85, 1), CHROME, Material.METAL)
+    b.metal((0, -0.15, 0), (1, 0.85, 1), CHROME)
     b.box((0, 0.2, 0), (0.92, 0.68, 0.96), (0.04, 0.04, 0.05))
     lit = b.state.toggled
     b.box((0, 0.86, 0), (0.84, 0.08, 0.74), _SCREEN if lit else (0.1, 0.12, 0.16), Material.GLASS,
@@ -181,5 +181,5 @@ def alarm_clock(b: Builder) -> None:
             (side * 0.5, 0.68, 0), (0.4, 0.28, 0.6), BRASS, Material.METAL, tilt=(0, 0, side * -35)
         )
         b.box((side * 0.48, -0.88, 0), (0.1, 0.12, 0.4), DARK)
-        b.box((side * 0.3, -0.16, -0.86), (0.16, 0.06, 0.14), BRASS, Material.METAL)
+        b.metal((side * 0.3, -0.16, -0.86), (0.16, 0.06, 0.14), BRASS)
     b.box((0, 0.8, 0), (0.06, 0.2, 0.12), DARK)

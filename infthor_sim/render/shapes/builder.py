@@ -11,6 +11,7 @@ from infthor_sim.objects import WALL, SimObject, SimObjectState
 from infthor_sim.render.primitives import Color, Form, Material, ShapePart
 
 Vector = Sequence[float] | Array
+CORNERS = ((-1, -1), (-1, 1), (1, -1), (1, 1))  # across and along
 _LINING = 0.003  # metres of the walls of open things that have the colour of their inside
 
 
@@ -45,6 +46,14 @@ class Builder:
     def thick(self, metres: float, axis: int) -> float:
         """Return a length in metres as a fraction of the half box along `axis`, at most 1."""
         return min(1.0, metres / max(float(self.half[axis]), 1e-6))
+
+    def extent(self, x: float, y: float, z: float) -> tuple[float, float, float]:
+        """Return lengths in metres along the three axes as `thick` does."""
+        return self.thick(x, 0), self.thick(y, 1), self.thick(z, 2)
+
+    def sides(self, x: float, z: float) -> tuple[float, float]:
+        """Return lengths in metres along both horizontal axes as `thick` does."""
+        return self.thick(x, 0), self.thick(z, 2)
 
     @property
     def slenderness(self) -> float:
@@ -81,6 +90,9 @@ class Builder:
         )
 
     box = partialmethod(add, Form.BOX)
+    wood = partialmethod(add, Form.BOX, material=Material.WOOD)
+    metal = partialmethod(add, Form.BOX, material=Material.METAL)
+    cloth = partialmethod(add, Form.BOX, material=Material.FABRIC)
     ball = partialmethod(add, Form.ELLIPSOID)
     tube = partialmethod(add, Form.CYLINDER)  # upright; `bottom` and `top` are its relative radii
     cup = partialmethod(add, Form.CUP)
@@ -177,7 +189,7 @@ class Builder:
         Args:
             floor: height of the bottom's upper side in fractions.
         """
-        x, z = self.thick(wall / 2, 0), self.thick(wall / 2, 2)
+        x, z = self.sides(wall / 2, wall / 2)
         self.span((-1, -1, -1), (1, floor, 1), shade_of(color, 0.88), material, glow=glow)
         for side in (-1, 1):
             self.box(

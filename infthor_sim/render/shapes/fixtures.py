@@ -59,13 +59,8 @@ def _basin(b: Builder, steel: bool) -> None:
     color = shade_of(STEEL, 1.12) if steel else _CERAMIC
     b.open_top(color, Material.METAL if steel else Material.PLAIN, 0.014, b.floor, glow=0.22)
     level = b.floor - b.thick(0.001, 1)
-    b.tube(
-        (0, level, 0),
-        (b.thick(0.04, 0), b.thick(0.0015, 1), b.thick(0.04, 2)),
-        CHROME,
-        Material.METAL,
-    )
-    b.tube((0, level, 0), (b.thick(0.028, 0), b.thick(0.002, 1), b.thick(0.028, 2)), DARK)
+    b.tube((0, level, 0), b.extent(0.04, 0.0015, 0.04), CHROME, Material.METAL)
+    b.tube((0, level, 0), b.extent(0.028, 0.002, 0.028), DARK)
 
 
 @draws
@@ -77,7 +72,7 @@ def faucet(b: Builder) -> None:
     b.rod((0, 0.7, 0.85), r * 0.7, float(b.half[1]) * 0.2, 1, CHROME)
     for side in (-1, 1):
         b.tube((side * 0.75, -0.75, -0.7), (0.2, 0.25, b.thick(0.02, 2)), CHROME, Material.METAL)
-    b.box((0, -0.93, -0.7), (1, 0.07, min(0.3, b.thick(0.03, 2))), CHROME, Material.METAL)
+    b.metal((0, -0.93, -0.7), (1, 0.07, min(0.3, b.thick(0.03, 2))), CHROME)
     if b.state.toggled:
         b.rod((0, -0.35, 0.85), 0.008, float(b.half[1]) * 0.9, 1, _WATER)
 
@@ -101,15 +96,13 @@ def toilet(b: Builder) -> None:
         b.box((0, 0.35, -0.4), (0.8, 0.45, 0.04), shade_of(_CERAMIC, 0.97))
     else:
         b.tube((0, -0.07, 0.25), (0.85, lid, 0.75), WHITE)
-    b.box((-0.7, 0.6, -0.42), (0.12, 0.03, 0.03), CHROME, Material.METAL)
+    b.metal((-0.7, 0.6, -0.42), (0.12, 0.03, 0.03), CHROME)
 
 
 @draws
 def window(b: Builder) -> None:
     """A bright pane in a white frame with a cross, at the wall side of its box."""
-    x = b.thick(0.03, 0)
-    y = b.thick(0.03, 1)
-    z = b.thick(0.05, 2)
+    x, y, z = b.extent(0.03, 0.03, 0.05)
     at = z - 1
     b.box((0, 0, at), (1 - x, 1 - y, z * 0.85), _SKY, Material.GLASS, glow=0.8)
     for side in (-1, 1):
@@ -148,7 +141,7 @@ def blinds(b: Builder) -> None:
 def painting(b: Builder) -> None:
     """A framed picture: hills, a ship at sea, flowers in a vase, or coloured squares."""
     x, y = b.thick(0.04, 0), b.thick(0.04, 1)
-    b.box((0, 0, -0.2), (1, 1, 0.8), pick((*WOODS, BLACK, BRASS), b.style), Material.WOOD)
+    b.wood((0, 0, -0.2), (1, 1, 0.8), pick((*WOODS, BLACK, BRASS), b.style))
     sky = pick(((0.7, 0.8, 0.9), (0.9, 0.75, 0.55), (0.6, 0.65, 0.8), (0.93, 0.9, 0.82)), b.style)
     b.box((0, 0, 0.3), (1 - x, 1 - y, 0.55), sky)
     _MOTIFS[b.style // 3 % len(_MOTIFS)](b, 1 - x, 1 - y)
@@ -190,7 +183,7 @@ _MOTIFS = (_hills, _ship, _flowers, _squares)
 @draws
 def mirror(b: Builder) -> None:
     """A shiny plate in a frame."""
-    b.box((0, 0, -0.3), (1, 1, 0.7), STEEL, Material.METAL)
+    b.metal((0, 0, -0.3), (1, 1, 0.7), STEEL)
     color: Color = (0.5, 0.45, 0.35) if b.state.dirty else (0.78, 0.86, 0.9)
     b.box((0, 0, 0.3), (1 - b.thick(0.02, 0), 1 - b.thick(0.02, 1), 0.6), color, Material.GLASS)
     if b.state.broken:
@@ -238,17 +231,15 @@ def shower_head(b: Builder) -> None:
 @draws
 def shower_glass(b: Builder) -> None:
     """A frame around a pane that one sees through: only its edges are drawn."""
-    x = b.thick(0.012, 0)
-    y = b.thick(0.012, 1)
-    z = b.thick(0.012, 2)
+    x, y, z = b.extent(0.012, 0.012, 0.012)
     flat = 0 if b.half[0] < b.half[2] else 2
     for side in (-1, 1):
         if flat == 0:
-            b.box((0, 0, side * (1 - z)), (min(1.0, x * 2), 1, z), CHROME, Material.METAL)
-            b.box((0, side * (1 - y), 0), (min(1.0, x * 2), y, 1), CHROME, Material.METAL)
+            b.metal((0, 0, side * (1 - z)), (min(1.0, x * 2), 1, z), CHROME)
+            b.metal((0, side * (1 - y), 0), (min(1.0, x * 2), y, 1), CHROME)
         else:
-            b.box((side * (1 - x), 0, 0), (x, 1, min(1.0, z * 2)), CHROME, Material.METAL)
-            b.box((0, side * (1 - y), 0), (1, y, min(1.0, z * 2)), CHROME, Material.METAL)
+            b.metal((side * (1 - x), 0, 0), (x, 1, min(1.0, z * 2)), CHROME)
+            b.metal((0, side * (1 - y), 0), (1, y, min(1.0, z * 2)), CHROME)
 
 
 @draws
@@ -279,13 +270,13 @@ def rail(b: Builder) -> None:
     """A bar that a towel hangs on."""
     b.rod((0, 0, 0.5), 0.01, float(b.half[0]), 0, CHROME)
     for side in (-1, 1):
-        b.box((side * 0.92, 0, -0.2), (0.06, 0.9, 0.8), CHROME, Material.METAL)
+        b.metal((side * 0.92, 0, -0.2), (0.06, 0.9, 0.8), CHROME)
 
 
 @draws
 def towel_hook(b: Builder) -> None:
     """A plate on the wall from which a short bar hangs."""
-    b.box((0, 0.55, -0.7), (0.35, 0.45, 0.3), CHROME, Material.METAL)
+    b.metal((0, 0.55, -0.7), (0.35, 0.45, 0.3), CHROME)
     level = b.level(0.055)
     b.rod((0, level, 0.5), 0.008, float(b.half[0]), 0, CHROME)
     b.span((-0.06, level, 0.35), (0.06, 0.6, 0.65), CHROME, Material.METAL)
@@ -296,7 +287,7 @@ def towel_hook(b: Builder) -> None:
 def paper_hanger(b: Builder) -> None:
     """A holder for a roll of paper."""
     b.rod((0, 0, 0.5), 0.012, float(b.half[0]), 0, CHROME)
-    b.box((0, 0, -0.8), (0.9, 0.8, 0.2), CHROME, Material.METAL)
+    b.metal((0, 0, -0.8), (0.9, 0.8, 0.2), CHROME)
 
 
 @draws

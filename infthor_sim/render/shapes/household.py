@@ -45,7 +45,7 @@ def book(b: Builder) -> None:
         return
     b.box((0.03, 0, 0), (0.94, 0.7, 0.96), PAPER)
     for side in (-1, 1):
-        b.box((0, side * 0.86, 0), (1, 0.14, 1), color, Material.FABRIC)
+        b.cloth((0, side * 0.86, 0), (1, 0.14, 1), color)
     b.box((-0.95, 0, 0), (0.05, 1, 1), shade_of(color, 0.8))
     b.box((0.1, 0.99, 0.2), (0.5, 0.02, 0.3), shade_of(color, 1.6))
 
@@ -87,7 +87,7 @@ def watch(b: Builder) -> None:
     b.tube((0, 0.88, 0), (round_x * 0.82, 0.04, 0.74), WHITE)
     b.box((0, 0.93, -0.22), (0.06, 0.04, 0.28), BLACK)
     b.box((0.16, 0.93, 0.05), (0.18, 0.04, 0.09), BLACK)
-    b.box((0, 0.52, 0.94), (0.09, 0.12, 0.06), case, Material.METAL)
+    b.metal((0, 0.52, 0.94), (0.09, 0.12, 0.06), case)
 
 
 @draws
@@ -136,16 +136,16 @@ def statue(b: Builder) -> None:
         _shards(b, color)
         return
     b.box((0, -0.92, 0), (0.8, 0.08, 0.9), DARK)
-    b.box((0, -0.8, 0), (0.64, 0.06, 0.76), shade_of(color, 0.75), Material.METAL)
+    b.metal((0, -0.8, 0), (0.64, 0.06, 0.76), shade_of(color, 0.75))
     b.tube((0, -0.38, 0), (0.46, 0.38, 0.56), color, Material.METAL, top=0.62)
     b.tube((0, 0.16, 0), (0.46, 0.22, 0.46), color, Material.METAL, bottom=0.6)
     b.ball((0, 0.38, 0), (0.5, 0.09, 0.48), color, Material.METAL)
     b.tube((0, 0.47, 0), (0.12, 0.08, 0.16), color, Material.METAL)
     b.ball((0, 0.65, 0.02), (0.23, 0.17, 0.34), color, Material.METAL)
-    b.box((-0.6, 0.6, 0), (0.1, 0.28, 0.17), color, Material.METAL, tilt=(0, 0, 18))
+    b.metal((-0.6, 0.6, 0), (0.1, 0.28, 0.17), color, tilt=(0, 0, 18))
     b.ball((-0.74, 0.9, 0), (0.13, 0.08, 0.2), color, Material.METAL)
-    b.box((0.55, 0.2, 0), (0.1, 0.17, 0.17), color, Material.METAL, tilt=(0, 0, 22))
-    b.box((0.5, -0.04, 0.05), (0.1, 0.15, 0.17), color, Material.METAL, tilt=(0, 0, -35))
+    b.metal((0.55, 0.2, 0), (0.1, 0.17, 0.17), color, tilt=(0, 0, 22))
+    b.metal((0.5, -0.04, 0.05), (0.1, 0.15, 0.17), color, tilt=(0, 0, -35))
 
 
 def _shards(b: Builder, color: Color) -> None:
@@ -210,7 +210,7 @@ def soap_bar(b: Builder) -> None:
 def sponge(b: Builder) -> None:
     """Two layers."""
     b.box((0, -0.3, 0), (1, 0.7, 1), (0.95, 0.82, 0.25), Material.STONE)
-    b.box((0, 0.7, 0), (1, 0.3, 1), (0.25, 0.5, 0.3), Material.FABRIC)
+    b.cloth((0, 0.7, 0), (1, 0.3, 1), (0.25, 0.5, 0.3))
 
 
 @draws
@@ -283,7 +283,7 @@ def foil(b: Builder) -> None:
     b.coin(0, (0, 0, -0.34), (1.005, 0.26, 0.17), BLACK)
     for index, shade in enumerate((1.4, 0.6, 1.3, 0.7, 1.35)):
         place = (0.02 * (index % 2), -0.8 + 0.1 * (index % 2), 0.1 + 0.2 * index)
-        b.box(place, (0.84, 0.1, 0.12), shade_of(bright, shade), Material.METAL,
+        b.metal(place, (0.84, 0.1, 0.12), shade_of(bright, shade),
               tilt=(14 if index % 2 else -14, 0, 0))  # fmt: skip
 
 

@@ -1,7 +1,7 @@
 """Chairs, sofas, beds and stools."""
 
 from infthor_sim.render.primitives import Color, Material
-from infthor_sim.render.shapes.builder import Builder, shade_of
+from infthor_sim.render.shapes.builder import CORNERS, Builder, shade_of
 from infthor_sim.render.shapes.catalogue import draws
 from infthor_sim.render.shapes.palette import BRASS, CLOTHS, WHITE, WOODS, pick
 
@@ -18,10 +18,8 @@ def chair(b: Builder) -> None:
     """A wooden chair with a back of slats."""
     color = pick(WOODS, b.style)
     level = _seat_level(b, -0.05)
-    x = b.thick(0.018, 0)
-    y = b.thick(0.015, 1)
-    z = b.thick(0.018, 2)
-    b.box((0, level - y, 0), (1, y, 1), color, Material.WOOD)
+    x, y, z = b.extent(0.018, 0.015, 0.018)
+    b.wood((0, level - y, 0), (1, y, 1), color)
     for side in (-1, 1):
         b.box(
             (side * (0.93 - x), (level - 1) / 2, 0.9 - z),
@@ -30,12 +28,7 @@ def chair(b: Builder) -> None:
         )
         b.box((side * (0.93 - x), 0, -0.93), (x, 1, z), shade_of(color, 0.85))
     for share in (0.35, 0.65, 0.95):
-        b.box(
-            (0, level + (1 - level) * share - 0.06, -0.93),
-            (0.9, 0.07, z * 0.7),
-            color,
-            Material.WOOD,
-        )
+        b.wood((0, level + (1 - level) * share - 0.06, -0.93), (0.9, 0.07, z * 0.7), color)
 
 
 @draws
@@ -43,13 +36,12 @@ def stool(b: Builder) -> None:
     """A round seat on legs."""
     color = pick(WOODS, b.style)
     b.tube((0, 0.92, 0), (1, 0.08, 1), color, Material.WOOD)
-    for sx in (-1, 1):
-        for sz in (-1, 1):
-            b.box(
-                (sx * 0.6, -0.08, sz * 0.6),
-                (b.thick(0.018, 0), 0.92, b.thick(0.018, 2)),
-                shade_of(color, 0.8),
-            )
+    for sx, sz in CORNERS:
+        b.box(
+            (sx * 0.6, -0.08, sz * 0.6),
+            (b.thick(0.018, 0), 0.92, b.thick(0.018, 2)),
+            shade_of(color, 0.8),
+        )
 
 
 @draws
@@ -59,31 +51,22 @@ def sofa(b: Builder) -> None:
     level = _seat_level(b, -0.05)
     arm = min(0.3, b.thick(0.11, 0))
     back = min(0.5, b.thick(0.11, 2))
-    b.box(
+    b.cloth(
         (0, (level - 1) / 2 - 0.02, 0),
         (1 - arm, (level + 1) / 2 - 0.05, 0.97),
         shade_of(color, 0.85),
-        Material.FABRIC,
     )
-    b.box((0, 0.0, -1 + back), (1 - arm, 1, back), color, Material.FABRIC)
+    b.cloth((0, 0.0, -1 + back), (1 - arm, 1, back), color)
     for side in (-1, 1):
         top = min(0.9, level + 0.45)
-        b.box(
-            (side * (1 - arm), (top - 1) / 2, 0),
-            (arm, (top + 1) / 2, 1),
-            shade_of(color, 0.95),
-            Material.FABRIC,
+        b.cloth(
+            (side * (1 - arm), (top - 1) / 2, 0), (arm, (top + 1) / 2, 1), shade_of(color, 0.95)
         )
     count = max(1, round(float(b.half[0]) / 0.4))
     width = (1 - 2 * arm) / count
     for index in range(count):
         at = -(1 - 2 * arm) + width * (2 * index + 1)
-        b.box(
-            (at, level - 0.1, back),
-            (width * 0.97, 0.1, 1 - back),
-            shade_of(color, 1.12),
-            Material.FABRIC,
-        )
+        b.cloth((at, level - 0.1, back), (width * 0.97, 0.1, 1 - back), shade_of(color, 1.12))
 
 
 @draws
@@ -94,9 +77,9 @@ def ottoman(b: Builder) -> None:
     for x in (-0.82, 0.82):
         for z in (-0.76, 0.76):
             b.tube((x, -0.74, z), (0.09, 0.26, 0.13), wood, Material.WOOD, bottom=0.55)
-    b.box((0, -0.16, 0), (0.96, 0.34, 0.95), shade_of(color, 0.85), Material.FABRIC)
+    b.cloth((0, -0.16, 0), (0.96, 0.34, 0.95), shade_of(color, 0.85))
     b.box((0, 0.24, 0), (1, 0.06, 1), shade_of(color, 0.6))
-    b.box((0, 0.5, 0), (0.98, 0.24, 0.97), color, Material.FABRIC)
+    b.cloth((0, 0.5, 0), (0.98, 0.24, 0.97), color)
     b.ball((0, 0.72, 0), (0.98, 0.28, 0.97), shade_of(color, 1.08), Material.FABRIC)
     for x, z in ((0, 0), (-0.5, -0.42), (0.5, -0.42), (-0.5, 0.42), (0.5, 0.42)):
         b.ball((x, 0.97 - 0.2 * (x * x + z * z), z), (0.06, 0.06, 0.09), shade_of(color, 0.45))
@@ -115,19 +98,12 @@ def bed(b: Builder) -> None:
     level = _seat_level(b, 0.2)
     z = b.thick(0.03, 2)
     frame = -1 + (level + 1) * 0.45
-    b.box((0, (frame - 1) / 2, 0), (1, (frame + 1) / 2, 1), shade_of(wood, 0.8), Material.WOOD)
-    b.box((0, 0, -1 + z), (1, 1, z), wood, Material.WOOD)
+    b.wood((0, (frame - 1) / 2, 0), (1, (frame + 1) / 2, 1), shade_of(wood, 0.8))
+    b.wood((0, 0, -1 + z), (1, 1, z), wood)
     linen: Color = (0.75, 0.68, 0.55) if b.state.dirty else WHITE
-    b.box(
-        (0, (frame + level) / 2, z), (0.97, (level - frame) / 2, 0.97 - z), linen, Material.FABRIC
-    )
+    b.cloth((0, (frame + level) / 2, z), (0.97, (level - frame) / 2, 0.97 - z), linen)
     if not b.state.dirty:
-        b.box(
-            (0, (frame + level) / 2 + 0.012, 0.35),
-            (0.985, (level - frame) / 2, 0.64),
-            cloth,
-            Material.FABRIC,
-        )
+        b.cloth((0, (frame + level) / 2 + 0.012, 0.35), (0.985, (level - frame) / 2, 0.64), cloth)
 
 
 @draws

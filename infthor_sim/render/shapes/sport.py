@@ -54,12 +54,12 @@ def racket(b: Builder) -> None:
         b.box(at(0.44 + 0.48 * offset), at(0.008, 0.86 * reach, 0.86), _STRING)
         b.box(at(0.44, 0.86 * offset), at(0.48 * reach, 0.02, 0.86), _STRING)
     b.box(at(-0.2), at(0.12, 0.13, 0.6), frame)
-    b.box(at(-0.66), at(0.34, 0.15, 0.9), BLACK, Material.FABRIC)
+    b.cloth(at(-0.66), at(0.34, 0.15, 0.9), BLACK)
 
 
 @draws
 def dumbbell(b: Builder) -> None:
     """Two weights on a bar."""
-    b.box((0, 0, 0), (0.25, 0.25, 1), CHROME, Material.METAL)
+    b.metal((0, 0, 0), (0.25, 0.25, 1), CHROME)
     for side in (-1, 1):
         b.box((0, 0, side * 0.7), (1, 1, 0.3), DARK)

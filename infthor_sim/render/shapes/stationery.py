@@ -67,13 +67,7 @@ def keys(b: Builder) -> None:
         x, z = math.sin(math.radians(angle)), math.cos(math.radians(angle))
         across = 0.42 * min(wide, deep * 1.2)
         at = (-0.5 + across * x / wide, 0.0, across * z / deep)
-        b.box(
-            at,
-            (0.36 * across / wide, 0.8, 0.006 / deep),
-            CHROME,
-            Material.METAL,
-            tilt=(0, angle, 0),
-        )
+        b.metal(at, (0.36 * across / wide, 0.8, 0.006 / deep), CHROME, tilt=(0, angle, 0))
     _key(b, 14.0, pick((BRASS, STEEL, (0.72, 0.42, 0.28)), b.mark // len(_TAGS)))
     _key(b, -20.0, STEEL)
     b.tube((-0.82, 0.1, 0.3), (0.2, 0.9, 0.34), pick(_TAGS, b.mark))
@@ -92,12 +86,6 @@ def _key(b: Builder, angle: float, color: Color) -> None:
     turn = (0.0, -angle, 0.0)
     b.tube(at(0.5, 0), (0.24, 0.6, 0.24 * wide / deep), color, Material.METAL)
     b.tube(at(0.44, 0), (0.08, 0.9, 0.08 * wide / deep), shade_of(color, 0.35))
-    b.box(at(1.05, 0), (0.42, 0.5, 0.07 * wide / deep), color, Material.METAL, tilt=turn)
+    b.metal(at(1.05, 0), (0.42, 0.5, 0.07 * wide / deep), color, tilt=turn)
     for along in (1.2, 1.38):
-        b.box(
-            at(along, 0.13),
-            (0.05, 0.5, 0.1 * wide / deep),
-            shade_of(color, 0.9),
-            Material.METAL,
-            tilt=turn,
-        )
+        b.metal(at(along, 0.13), (0.05, 0.5, 0.1 * wide / deep), shade_of(color, 0.9), tilt=turn)

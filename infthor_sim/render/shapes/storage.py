@@ -95,7 +95,7 @@ def cabinet(b: Builder) -> None:
                      top=not b.item.hollow)  # fmt: skip
     elif not b.item.hollow:
         back = b.thick(_LEAF, 2)
-        b.box((0, 0, -back / 2), (1, 1, 1 - back / 2), shade_of(color, 0.8), Material.WOOD)
+        b.wood((0, 0, -back / 2), (1, 1, 1 - back / 2), shade_of(color, 0.8))
     else:  # nothing but a panel behind the door, so that the wall is not seen past its edges
         leaf = b.thick(_LEAF, 2)
         b.span((-1, -1, 1 - 1.4 * leaf), (1, 1, 1 - leaf), shade_of(color, 0.8), Material.WOOD)
@@ -120,8 +120,8 @@ def drawer(b: Builder) -> None:
         b.span((gap - 1, floor, back), (x - 1, _TRAY, front), side, Material.WOOD, glow=_LIT)
         b.span((1 - x, floor, back), (1 - gap, _TRAY, front), side, Material.WOOD, glow=_LIT)
     else:
-        b.box((0, 0, -leaf), (0.94, 0.92, 1 - leaf), shade_of(color, 0.75), Material.WOOD)
-    b.box((0, 0, out + 1 - leaf), (0.985, 0.96, leaf), color, Material.WOOD)
+        b.wood((0, 0, -leaf), (0.94, 0.92, 1 - leaf), shade_of(color, 0.75))
+    b.wood((0, 0, out + 1 - leaf), (0.985, 0.96, leaf), color)
     b.rod(
         (0, 0.25, out + 1 + 0.012 / max(float(b.half[2]), 0.01)),
         0.006,
@@ -137,7 +137,7 @@ def fridge(b: Builder) -> None:
     color = (WHITE, STEEL, (0.86, 0.87, 0.88))[b.style % 3]
     if b.state.openness == 0:
         z = b.thick(0.025, 2)
-        b.box((0, 0, -z), (1, 1, 1 - z), shade_of(color, 0.92), Material.METAL)
+        b.metal((0, 0, -z), (1, 1, 1 - z), shade_of(color, 0.92))
     else:
         _lit_inside(b, shade_of(color, 0.92))
     _door(b, color, Material.METAL, DARK, -0.97, 0.3, _FRIDGE_GRIP)
@@ -149,7 +149,7 @@ def fridge(b: Builder) -> None:
 
 def _fridge_sides(b: Builder) -> None:
     """What tells a fridge from the side: the seals behind its doors, a dark foot, notes."""
-    x, z = b.thick(0.004, 0), b.thick(0.006, 2)
+    x, z = b.sides(0.004, 0.006)
     seal = 1 - b.thick(_FRIDGE_GRIP + _LEAF, 2) - z
     for side in (-1, 1):
         if b.state.openness == 0:
@@ -211,22 +211,22 @@ def _door_racks(b: Builder) -> None:
 def microwave(b: Builder) -> None:
     """A microwave oven: a dark window, a panel of keys, vents behind; lit inside while it runs."""
     body = (STEEL, DARK, WHITE)[b.style % 3]
-    x, z = b.thick(0.02, 0), b.thick(0.01, 2)
+    x, z = b.sides(0.02, 0.01)
     lit = 0.75 if b.state.toggled else 0.0
     panel = shade_of(body, 0.9)
     door = shade_of(body, 0.85)
     if b.state.openness == 0:
-        b.box((0, 0, -z), (1, 1, 1 - z), body, Material.METAL)
+        b.metal((0, 0, -z), (1, 1, 1 - z), body)
         window: Color = (0.9, 0.75, 0.4) if b.state.toggled else _WINDOW
-        b.box((0.22, 0, 1 - z), (0.74, 0.92, z), door, Material.METAL)
+        b.metal((0.22, 0, 1 - z), (0.74, 0.92, z), door)
         b.box((0.27, 0, 1 - z / 2), (0.58, 0.68, z), window, Material.GLASS, glow=lit)
-        b.box((-0.44, 0, 1 + z), (x, 0.7, z), CHROME, Material.METAL)
+        b.metal((-0.44, 0, 1 + z), (x, 0.7, z), CHROME)
     else:
         b.open_front(body, shade_of(STEEL, 1.1), Material.METAL, b.item.floors[0], glow=0.3)
         b.tube(
             (0.2, b.floor, 0), (0.55, b.thick(0.002, 1), 0.75), (0.8, 0.86, 0.88), Material.GLASS
         )
-        b.box((-0.76, 0, 0), (0.22, 0.94, 0.98), panel, Material.METAL)
+        b.metal((-0.76, 0, 0), (0.22, 0.94, 0.98), panel)
         wide = float(b.half[0])
         high = float(b.half[1])
         angle = DOOR_SWING * b.state.openness
@@ -258,7 +258,7 @@ def microwave(b: Builder) -> None:
 
 def _vents(b: Builder) -> None:
     """Dark slots, a plate of data and the root of the cord on the back, and slots on both sides."""
-    x, z = b.thick(0.003, 0), b.thick(0.003, 2)
+    x, z = b.sides(0.003, 0.003)
     for level in (0.6, 0.28, -0.04):
         b.box((0.35, level, -1), (0.5, 0.09, z), BLACK)
         for side in (-1, 1):
@@ -273,7 +273,7 @@ def safe(b: Builder) -> None:
     body: Color = (0.3, 0.32, 0.35)
     if b.state.openness == 0:
         z = b.thick(0.02, 2)
-        b.box((0, 0, -z), (1, 1, 1 - z), body, Material.METAL)
+        b.metal((0, 0, -z), (1, 1, 1 - z), body)
     else:
         b.open_front(body, shade_of(body, 1.7), Material.METAL, b.item.floors[0], glow=_LIT)
     _bands(b, shade_of(body, 1.7))
@@ -298,16 +298,16 @@ def safe(b: Builder) -> None:
 
 def _bands(b: Builder, color: Color) -> None:
     """Steel bands up the sides and along the edges of back and sides, with bolts."""
-    x, y, z = b.thick(0.004, 0), b.thick(0.004, 1), b.thick(0.004, 2)
+    x, y, z = b.extent(0.004, 0.004, 0.004)
     front = 1 - b.thick(0.04, 2)
     for level in (-0.86, 0.86):
         b.span((-1 - x, level - 0.14, -1 - z), (1 + x, level + 0.14, -1), color, Material.METAL)
         for side in (-1, 1):
-            b.box((side, level, (front - 1) / 2), (x, 0.14, (front + 1) / 2), color, Material.METAL)
-            b.box((side * 0.86, 0, -1), (0.14, 0.86, z), color, Material.METAL)
+            b.metal((side, level, (front - 1) / 2), (x, 0.14, (front + 1) / 2), color)
+            b.metal((side * 0.86, 0, -1), (0.14, 0.86, z), color)
             b.ball((side, level, -0.86), (3 * x, 0.06, 0.06), _BOLT)
             b.ball((side * 0.86, level, -1), (0.06, 0.06, 3 * z), _BOLT)
-    b.box((0, 1, (front - 1) / 2), (0.14, y, (front + 1) / 2), color, Material.METAL)
+    b.metal((0, 1, (front - 1) / 2), (0.14, y, (front + 1) / 2), color)
 
 
 @draws
@@ -327,7 +327,7 @@ def carton(b: Builder) -> None:
 
 def _body(b: Builder, color: Color, share: float) -> None:
     """Add four sides and a bottom, within the share of the box that the flaps leave."""
-    x, z = b.thick(0.006, 0), b.thick(0.006, 2)
+    x, z = b.sides(0.006, 0.006)
     b.span((-share, -1, -share), (share, b.floor, share), shade_of(color, 0.88), glow=0.12)
     for side in (-1, 1):
         b.box((side * (share - x), 0, 0), (x, 1, share), color, glow=0.12)

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from infthor_sim.physics.footprints import Rect
 from infthor_sim.render.primitives import Color, Material
-from infthor_sim.render.shapes.builder import Builder, shade_of
+from infthor_sim.render.shapes.builder import CORNERS, Builder, shade_of
 from infthor_sim.render.shapes.catalogue import draws
 from infthor_sim.render.shapes.palette import CHROME, CLOTHS, DARK, WOODS, pick
 
@@ -60,12 +60,12 @@ def _turn(rect: Rect, quarters: int) -> Rect:
 
 def _carcass(b: Builder, color: Color, top: float) -> None:
     """Add sides and back from the floor up to `top`; the front is left to drawers."""
-    x, z = b.thick(0.012, 0), b.thick(0.01, 2)
+    x, z = b.sides(0.012, 0.01)
     middle = (top - 1) / 2
     half = (top + 1) / 2
     for side in (-1, 1):
-        b.box((side * (1 - x), middle, 0), (x, half, 1), shade_of(color, 0.9), Material.WOOD)
-    b.box((0, middle, -1 + z), (1 - 2 * x, half, z), shade_of(color, 0.7), Material.WOOD)
+        b.wood((side * (1 - x), middle, 0), (x, half, 1), shade_of(color, 0.9))
+    b.wood((0, middle, -1 + z), (1 - 2 * x, half, z), shade_of(color, 0.7))
 
 
 def _surface(b: Builder) -> float:
@@ -77,34 +77,18 @@ def _top(b: Builder, color: Color, edge: float) -> float:
     """Add a board, and a back where the box is higher; return the board's lower height."""
     surface = _surface(b)
     board = b.thick(0.02, 1)
-    b.box((0, surface - board, 0), (1, board, 1), color, Material.WOOD)
-    b.box(
-        (0, surface - 1.3 * board, 0),
-        (1.004, 0.5 * board, 1.004),
-        shade_of(color, edge),
-        Material.WOOD,
-    )
+    b.wood((0, surface - board, 0), (1, board, 1), color)
+    b.wood((0, surface - 1.3 * board, 0), (1.004, 0.5 * board, 1.004), shade_of(color, edge))
     if surface < 1 - b.thick(0.12, 1):
         z = b.thick(0.015, 2)
-        b.box(
-            (0, (1 + surface) / 2, -1 + z),
-            (1, (1 - surface) / 2, z),
-            shade_of(color, 0.85),
-            Material.WOOD,
-        )
+        b.wood((0, (1 + surface) / 2, -1 + z), (1, (1 - surface) / 2, z), shade_of(color, 0.85))
     return surface - 2 * board
 
 
 def _legs(b: Builder, under: float, thick: float, color: Color) -> None:
-    x, z = b.thick(thick, 0), b.thick(thick, 2)
-    for sx in (-1, 1):
-        for sz in (-1, 1):
-            b.box(
-                (sx * (0.97 - x), (under - 1) / 2, sz * (0.97 - z)),
-                (x, (under + 1) / 2, z),
-                color,
-                Material.WOOD,
-            )
+    x, z = b.sides(thick, thick)
+    for sx, sz in CORNERS:
+        b.wood((sx * (0.97 - x), (under - 1) / 2, sz * (0.97 - z)), (x, (under + 1) / 2, z), color)
 
 
 @draws
@@ -119,7 +103,7 @@ def desk(b: Builder) -> None:
     if b.item.hollow:
         _carcass(b, color, under)
         return
-    x, z = b.thick(0.015, 0), b.thick(0.01, 2)
+    x, z = b.sides(0.015, 0.01)
     wide = min(0.35, b.thick(0.2, 0))
     b.span((-0.98, -1, -0.94), (-0.98 + 2 * x, under, 0.94), shade_of(color, 0.85), Material.WOOD)
     b.span(
@@ -136,11 +120,8 @@ def desk(b: Builder) -> None:
         low = -0.94 + rise * row
         b.span((0.98 - 1.9 * wide, low + 0.03, 0.92), (0.98 - 0.1 * wide, low + rise - 0.03, 0.95),
                shade_of(color, 1.12), Material.WOOD)  # fmt: skip
-        b.box(
-            (0.98 - wide, low + rise * 0.6, 0.965),
-            (wide * 0.3, b.thick(0.008, 1), 0.02),
-            CHROME,
-            Material.METAL,
+        b.metal(
+            (0.98 - wide, low + rise * 0.6, 0.965), (wide * 0.3, b.thick(0.008, 1), 0.02), CHROME
         )
 
 
@@ -156,30 +137,27 @@ def dining_table(b: Builder) -> None:
     # half a millimetre above the board
     level = _surface(b) - b.thick(0.001, 1)
     half = b.thick(0.0015, 1)
-    b.box((0, level, 0), b.lengthwise(0.999, half, 0.3), runner, Material.FABRIC)
-    b.box(
-        (0, level, 0), b.lengthwise(0.9, half * 1.3, 0.22), shade_of(runner, 1.3), Material.FABRIC
-    )
+    b.cloth((0, level, 0), b.lengthwise(0.999, half, 0.3), runner)
+    b.cloth((0, level, 0), b.lengthwise(0.9, half * 1.3, 0.22), shade_of(runner, 1.3))
     leg = shade_of(color, 0.78)
-    x, z = b.thick(0.05, 0), b.thick(0.05, 2)
+    x, z = b.sides(0.05, 0.05)
     low = -1 + b.thick(0.05, 1)
     neck = under - b.thick(0.12, 1)
-    for sx in (-1, 1):
-        for sz in (-1, 1):
-            at_x = sx * (0.94 - x)
-            at_z = sz * (0.94 - z)
-            b.box((at_x, (under + neck) / 2, at_z), (x, (under - neck) / 2, z), leg, Material.WOOD)
-            b.tube(
-                (at_x, (neck + low) / 2, at_z),
-                (x, (neck - low) / 2, z),
-                leg,
-                Material.WOOD,
-                bottom=0.55,
-                top=0.95,
-            )
-            b.ball((at_x, low, at_z), (x * 0.8, b.thick(0.05, 1), z * 0.8), shade_of(leg, 0.85))
+    for sx, sz in CORNERS:
+        at_x = sx * (0.94 - x)
+        at_z = sz * (0.94 - z)
+        b.wood((at_x, (under + neck) / 2, at_z), (x, (under - neck) / 2, z), leg)
+        b.tube(
+            (at_x, (neck + low) / 2, at_z),
+            (x, (neck - low) / 2, z),
+            leg,
+            Material.WOOD,
+            bottom=0.55,
+            top=0.95,
+        )
+        b.ball((at_x, low, at_z), (x * 0.8, b.thick(0.05, 1), z * 0.8), shade_of(leg, 0.85))
     apron = b.thick(0.05, 1)
-    b.box((0, under - apron, 0), (0.9, apron, 0.88), shade_of(color, 0.85), Material.WOOD)
+    b.wood((0, under - apron, 0), (0.9, apron, 0.88), shade_of(color, 0.85))
 
 
 @draws
@@ -192,12 +170,10 @@ def side_table(b: Builder) -> None:
         return
     _legs(b, under, 0.018, shade_of(color, 0.85))
     half = min(b.thick(0.07, 1), (under + 1) / 4)
-    b.box((0, under - half, 0), (0.93, half, 0.93), shade_of(color, 0.8), Material.WOOD)
-    b.box((0, under - half, 0.94), (0.8, half * 0.8, 0.02), shade_of(color, 1.12), Material.WOOD)
-    b.ball(
-        (0, under - half, 0.98), (b.thick(0.016, 0), b.thick(0.016, 1), b.thick(0.016, 2)), CHROME
-    )
-    b.box((0, -0.72, 0), (0.92, b.thick(0.01, 1), 0.92), shade_of(color, 0.9), Material.WOOD)
+    b.wood((0, under - half, 0), (0.93, half, 0.93), shade_of(color, 0.8))
+    b.wood((0, under - half, 0.94), (0.8, half * 0.8, 0.02), shade_of(color, 1.12))
+    b.ball((0, under - half, 0.98), b.extent(0.016, 0.016, 0.016), CHROME)
+    b.wood((0, -0.72, 0), (0.92, b.thick(0.01, 1), 0.92), shade_of(color, 0.9))
 
 
 @draws
@@ -209,7 +185,7 @@ def coffee_table(b: Builder) -> None:
         _carcass(b, color, under)
         return
     _legs(b, under, 0.035, shade_of(color, 0.8))
-    b.box((0, -0.55, 0), (0.93, b.thick(0.01, 1), 0.9), shade_of(color, 0.9), Material.WOOD)
+    b.wood((0, -0.55, 0), (0.93, b.thick(0.01, 1), 0.9), shade_of(color, 0.9))
 
 
 @draws
@@ -218,7 +194,7 @@ def chest(b: Builder) -> None:
     color = pick(WOODS, b.style)
     board = b.thick(0.02, 1)
     top = _surface(b)
-    b.box((0, top - board, 0), (1, board, 1), color, Material.WOOD)
+    b.wood((0, top - board, 0), (1, board, 1), color)
     if b.item.hollow:
         _carcass(b, color, top - 2 * board)
         if not b.item.asset_id:
@@ -226,16 +202,12 @@ def chest(b: Builder) -> None:
         return
     middle = (top - 2 * board - 1) / 2
     half = (top - 2 * board + 1) / 2
-    b.box((0, middle, -0.02), (0.97, half, 0.95), shade_of(color, 0.85), Material.WOOD)
+    b.wood((0, middle, -0.02), (0.97, half, 0.95), shade_of(color, 0.85))
     for row in range(3):
         level = middle + half * (0.6 - row * 0.6)
         for side in (-1, 1):
-            b.box((side * 0.48, level, 0.96), (0.45, 0.26, 0.03), color, Material.WOOD)
-            b.ball(
-                (side * 0.48, level, 1.0),
-                (b.thick(0.015, 0), b.thick(0.015, 1), b.thick(0.015, 2)),
-                CHROME,
-            )
+            b.wood((side * 0.48, level, 0.96), (0.45, 0.26, 0.03), color)
+            b.ball((side * 0.48, level, 1.0), b.extent(0.015, 0.015, 0.015), CHROME)
 
 
 def _drawer_frame(b: Builder, color: Color, top: float) -> None:
@@ -262,23 +234,19 @@ def shelf(b: Builder) -> None:
 def shelving(b: Builder) -> None:
     """An open rack on posts."""
     color = pick(WOODS, b.style)
-    x = b.thick(0.015, 0)
-    y = b.thick(0.01, 1)
-    z = b.thick(0.015, 2)
-    for side_x in (-1, 1):
-        for side_z in (-1, 1):
-            b.box((side_x * (1 - x), 0, side_z * (1 - z)), (x, 1, z), color, Material.WOOD)
+    x, y, z = b.extent(0.015, 0.01, 0.015)
+    for side_x, side_z in CORNERS:
+        b.wood((side_x * (1 - x), 0, side_z * (1 - z)), (x, 1, z), color)
     levels: Sequence[float] = (-0.9, 1 - y) if b.item.hollow else (-0.9, -0.3, 0.3, 1 - y)
     for level in levels:
-        b.box((0, level, 0), (1, y, 1), shade_of(color, 0.95), Material.WOOD)
+        b.wood((0, level, 0), (1, y, 1), shade_of(color, 0.95))
 
 
 @draws
 def cart(b: Builder) -> None:
     """Two trays on wheels."""
     for level in (-0.5, 0.94):
-        b.box((0, level, 0), (1, 0.06, 1), (0.75, 0.77, 0.8), Material.METAL)
-    for sx in (-1, 1):
-        for sz in (-1, 1):
-            b.box((sx * 0.94, 0, sz * 0.94), (0.04, 0.98, 0.04), CHROME, Material.METAL)
-            b.ball((sx * 0.94, -0.95, sz * 0.94), (0.08, 0.06, 0.08), DARK)
+        b.metal((0, level, 0), (1, 0.06, 1), (0.75, 0.77, 0.8))
+    for sx, sz in CORNERS:
+        b.metal((sx * 0.94, 0, sz * 0.94), (0.04, 0.98, 0.04), CHROME)
+        b.ball((sx * 0.94, -0.95, sz * 0.94), (0.08, 0.06, 0.08), DARK)

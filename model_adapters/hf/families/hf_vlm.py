@@ -27,11 +27,7 @@ from model_adapters.hf.families.pixtral import PixtralFamily
 from model_adapters.hf.families.plain import PlainFamily, three_axis_positions
 from model_adapters.hf.families.qwen2_5_vl import Qwen25VLFamily
 from model_adapters.hf.family import ClipShape, MakeFamily, Pixels, Shape, Size
-from model_adapters.hf.loading.checkpoint import (
-    LocatedCheckpoint,
-    load_checkpoint,
-    locate,
-)
+from model_adapters.hf.loading.checkpoint import LocatedCheckpoint, load_checkpoint, locate
 from model_adapters.hf.loading.processors import load_processor
 from model_adapters.hf.prompting.ahead import Ahead, PixelsAhead, read_pixels
 from model_adapters.hf.prompting.embedding import Embed

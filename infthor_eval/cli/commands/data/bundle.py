@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from infthor_eval.cli.help import ExampleCommand
+from infthor_eval.cli.help import example_command
 from infthor_eval.cli.options.values import PATH
 from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
 
@@ -18,10 +18,8 @@ if TYPE_CHECKING:
     from infthor_eval.workers import WorkerSettings
 
 
-@click.command(
-    "bundle",
-    cls=ExampleCommand,
-    example="infthor-eval bundle infthor_eval/sets/nieh_mini/manifest.json --out build/nieh_mini",
+@example_command(
+    "bundle", "infthor-eval bundle infthor_eval/sets/nieh_mini/manifest.json --out build/nieh_mini"
 )
 @click.argument("manifest", type=PATH)
 @click.option(

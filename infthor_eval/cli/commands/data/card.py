@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from infthor_eval.cli.help import ExampleCommand
+from infthor_eval.cli.help import example_command
 from infthor_eval.cli.options.values import PATH, SET
 
 _PICTURE = "card.png"
@@ -24,11 +24,7 @@ def _read_day(_context: click.Context, _option: click.Parameter, text: str | Non
     raise click.BadParameter(f"{text!r} is no day; write YYYY-MM-DD")
 
 
-@click.command(
-    "card",
-    cls=ExampleCommand,
-    example="infthor-eval card my_twins --licence CC-BY-4.0 --creator Me",
-)
+@example_command("card", "infthor-eval card my_twins --licence CC-BY-4.0 --creator Me")
 @click.argument("set_folder", metavar="SET", type=SET)
 @click.option("--licence", required=True, metavar="ID", help="SPDX identifier: CC-BY-4.0, MIT.")
 @click.option("--name", metavar="TEXT", help="Name of the set; default: that of its folder.")

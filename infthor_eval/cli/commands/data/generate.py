@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from infthor_eval.cli.help import ExampleCommand
+from infthor_eval.cli.help import example_command
 from infthor_eval.cli.options.values import (
     PATH,
     SceneName,
     WholeNumber,
+    default_option,
     floor_plans_option,
     split_names,
 )
@@ -23,11 +24,7 @@ if TYPE_CHECKING:
     from infthor_eval.generation.generate_set import GenerationSummary
 
 
-@click.command(
-    "generate",
-    cls=ExampleCommand,
-    example="infthor-eval generate --scene kitchen-3 --seed 1 --out trajectories",
-)
+@example_command("generate", "infthor-eval generate --scene kitchen-3 --seed 1 --out trajectories")
 @click.option(
     "--scene",
     "scenes",
@@ -42,49 +39,28 @@ if TYPE_CHECKING:
     help="kitchen-3, FloorPlan10, ... (see `ls scenes`), or the file of a ProcTHOR house "
     "(house.json); several with commas.",
 )
-@click.option(
-    "--min-steps",
-    type=click.IntRange(1),
-    default=300,
-    show_default=True,
-    help="Low-level actions, at least.",
-)
-@click.option(
+@default_option("--min-steps", click.IntRange(1), 300, "Low-level actions, at least.")
+@default_option(
     "--min-subgoals",
-    type=click.IntRange(1),
+    click.IntRange(1),
     default=10,
-    show_default=True,
     help="Sub-goals, at least: tasks, and put-downs of what they leave in the hand.",
 )
-@click.option(
+@default_option(
     "--max-fail",
-    type=click.IntRange(1),
+    click.IntRange(1),
     default=20,
-    show_default=True,
     help="Failed tasks in a row after which the last sub-goals are dropped.",
 )
-@click.option(
+@default_option(
     "--save-floor",
-    type=click.IntRange(0),
+    click.IntRange(0),
     default=0,
-    show_default=True,
     help="Keep a trajectory that gives up as far as it got, if it has so many low-level actions; "
     "0: never.",
 )
-@click.option(
-    "--seed",
-    type=WholeNumber(0),
-    default=0,
-    show_default=True,
-    help="Seed of the first trajectory.",
-)
-@click.option(
-    "--count",
-    type=click.IntRange(1),
-    default=1,
-    show_default=True,
-    help="Trajectories for each scene.",
-)
+@default_option("--seed", WholeNumber(0), 0, "Seed of the first trajectory.")
+@default_option("--count", click.IntRange(1), 1, "Trajectories for each scene.")
 @click.option(
     "--final-task",
     is_flag=True,
@@ -107,11 +83,10 @@ if TYPE_CHECKING:
     is_flag=True,
     help="Walk long stretches with a level camera, as an option of the published generator does.",
 )
-@click.option(
+@default_option(
     "--words",
-    type=click.Choice(("natural", "published")),
+    click.Choice(("natural", "published")),
     default="natural",
-    show_default=True,
     help="Tasks in plain English, or in the words of the published generator, drawn by the seed.",
 )
 @click.option(

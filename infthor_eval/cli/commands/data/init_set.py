@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from infthor_eval.cli.help import ExampleCommand
+from infthor_eval.cli.help import example_command
 from infthor_eval.cli.options.values import PATH
+from infthor_eval.errors import DataError, UsageError, wrap_errors
 
 if TYPE_CHECKING:
     from PIL import Image
@@ -43,7 +44,7 @@ several answers (green | blue) all are required. Both questions of a pair have i
 """
 
 
-@click.command("init-set", cls=ExampleCommand, example="infthor-eval init-set my_set")
+@example_command("init-set", "infthor-eval init-set my_set")
 @click.argument("folder", metavar="DIR", type=PATH)
 def command(folder: Path) -> None:
     """Write a film, a folder of frames and questions on them into DIR, which is new or empty.
@@ -52,7 +53,6 @@ def command(folder: Path) -> None:
     """
     import shlex
 
-    from infthor_eval.errors import UsageError, wrap_errors
     from infthor_eval.storage.files import prepare_folder, writing_hint
     from infthor_eval.terminal import print_line
 
@@ -73,8 +73,6 @@ def _write_film(path: Path) -> None:
     """Write a film that shows each colour for a second."""
     import cv2
     import numpy as np
-
-    from infthor_eval.errors import DataError
 
     size = (_SIDE, _SIDE)
     film = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"mp4v"), 1.0, size)

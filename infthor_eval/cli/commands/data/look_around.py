@@ -5,22 +5,17 @@ from pathlib import Path
 
 import click
 
-from infthor_eval.cli.help import ExampleCommand
-from infthor_eval.cli.options.values import PATH
+from infthor_eval.cli.help import example_command
+from infthor_eval.cli.options.values import PATH, default_option
 
 
-@click.command(
-    "look-around",
-    cls=ExampleCommand,
-    example="infthor-eval look-around trajectories --out trajectories_level",
-)
+@example_command("look-around", "infthor-eval look-around trajectories --out trajectories_level")
 @click.argument("trajectories", type=PATH)
 @click.option("--out", type=PATH, required=True, help="File, or folder for the files of a folder.")
-@click.option(
+@default_option(
     "--min-run",
-    type=click.IntRange(1),
+    click.IntRange(1),
     default=6,
-    show_default=True,
     help="Moves and turns in a row for which the camera is raised, at least.",
 )
 def command(trajectories: Path, out: Path, min_run: int) -> int:

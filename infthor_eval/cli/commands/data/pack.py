@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from infthor_eval.cli.help import ExampleCommand
+from infthor_eval.cli.help import example_command
 from infthor_eval.cli.options.values import PATH, SET
-from infthor_eval.errors import UsageError
+from infthor_eval.errors import UsageError, wrap_errors
+from infthor_eval.terminal import error_console, print_line, progress_bar
 
 if TYPE_CHECKING:
     from infthor_eval.formats.packed.groups import Packed
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 _out = click.option("--out", required=True, type=PATH, help="Folder of the new set, new or empty.")
 
 
-@click.command("pack", cls=ExampleCommand, example="infthor-eval pack SET --out PACKED")
+@example_command("pack", "infthor-eval pack SET --out PACKED")
 @click.argument("set_folder", metavar="SET", type=PATH)
 @_out
 @click.pass_context
@@ -32,7 +33,6 @@ def pack(context: click.Context, set_folder: Path, out: Path) -> None:
     from infthor_eval.cli.progress.bar import PacedBar
     from infthor_eval.formats.nieh_set import NiehSet
     from infthor_eval.formats.packed.writing import pack_set
-    from infthor_eval.terminal import error_console, progress_bar
 
     data = NiehSet(set_folder)
     if not set_folder.is_dir() or not (data.has_frames and (data.directory / "metadata").is_dir()):
@@ -47,7 +47,7 @@ def pack(context: click.Context, set_folder: Path, out: Path) -> None:
     _finish(context, packed, out)
 
 
-@click.command("unpack", cls=ExampleCommand, example="infthor-eval unpack PACKED --out SET")
+@example_command("unpack", "infthor-eval unpack PACKED --out SET")
 @click.argument("packed", metavar="PACKED", type=SET)
 @_out
 @click.option("--skip-damaged", is_flag=True, help="Leave out trajectories that cannot be read.")
@@ -70,7 +70,6 @@ def unpack(context: click.Context, packed: Path, out: Path, skip_damaged: bool) 
 @contextmanager
 def _new_folder(out: Path) -> Iterator[Path]:
     """Yield a folder that becomes `out` when all is written."""
-    from infthor_eval.errors import wrap_errors
     from infthor_eval.storage.files import prepare_folder, write_atomically, writing_hint
 
     prepare_folder(out)
@@ -84,8 +83,6 @@ def _new_folder(out: Path) -> Iterator[Path]:
 
 
 def _finish(context: click.Context, packed: Packed, out: Path) -> None:
-    from infthor_eval.terminal import error_console, print_line
-
     files = [path for path in out.rglob("*") if path.is_file()]
     size = sum(path.stat().st_size for path in files)
     print_line(

@@ -3,15 +3,26 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from infthor_eval.cli.help import ExampleCommand
-from infthor_eval.cli.options.values import PATH, SET, FiniteFloat, WholeNumber, floor_plans_option
+from infthor_eval.cli.help import example_command
+from infthor_eval.cli.options.values import (
+    PATH,
+    SET,
+    FiniteFloat,
+    WholeNumber,
+    default_option,
+    floor_plans_option,
+)
 from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
-from infthor_eval.errors import UsageError
+from infthor_eval.cli.progress.bar import PacedBar
+from infthor_eval.errors import UsageError, wrap_errors
+from infthor_eval.storage.files import hold_folder, prepare_file, refuse_overwrite, write_atomically
+from infthor_eval.terminal import console, error_console, print_line, progress_bar
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -22,31 +33,22 @@ if TYPE_CHECKING:
     from infthor_eval.generation.twins.twin_set import FinalTaskSummary, TwinSummary
 
 
-@click.command(
-    "questions", cls=ExampleCommand, example="infthor-eval questions SET --out SET/qa_set_mine.csv"
-)
+@example_command("questions", "infthor-eval questions SET --out SET/qa_set_mine.csv")
 @click.argument("folder", metavar="SET", type=SET)
 @click.option("--out", required=True, type=PATH, help="CSV file to write.")
-@click.option(
-    "--seed", type=WholeNumber(0), default=0, show_default=True, help="Seed of every choice."
-)
-@click.option(
-    "--per-trajectory",
-    type=click.IntRange(1),
-    default=25,
-    show_default=True,
-    help="Questions per trajectory and moment, at most.",
+@default_option("--seed", WholeNumber(0), 0, "Seed of every choice.")
+@default_option(
+    "--per-trajectory", click.IntRange(1), 25, "Questions per trajectory and moment, at most."
 )
 @click.option(
     "--moments",
     type=click.IntRange(1),
     help="Ask at so many moments of each trajectory, evenly spaced. Default: at its end.",
 )
-@click.option(
+@default_option(
     "--min-share",
-    type=FiniteFloat(0, 1),
+    FiniteFloat(0, 1),
     default=0.001,
-    show_default=True,
     help="Share of a frame's pixels that an object must fill to count as visible.",
 )
 @click.option(
@@ -54,11 +56,10 @@ if TYPE_CHECKING:
     is_flag=True,
     help="Add question forms that are not in Table 3, with their own types.",
 )
-@click.option(
+@default_option(
     "--words",
-    type=click.Choice(["plain", "published"]),
+    click.Choice(["plain", "published"]),
     default="plain",
-    show_default=True,
     help="Plain English, or the published files' words with type names, to extend the published "
     "set.",
 )
@@ -82,10 +83,7 @@ def questions(
 
     Exit code 1 if a trajectory of the set cannot be read.
     """
-    from infthor_eval.cli.progress.bar import PacedBar
     from infthor_eval.generation.questions.generate import generate_questions
-    from infthor_eval.storage.files import prepare_file
-    from infthor_eval.terminal import error_console, print_line, progress_bar
 
     worker_settings = parse_worker_settings(**workers)
     prepare_file(out)
@@ -113,20 +111,14 @@ def questions(
     context.exit(1 if result.skipped else 0)
 
 
-@click.command(
-    "moments", cls=ExampleCommand, example="infthor-eval moments SET --out SET/moments.csv"
-)
+@example_command("moments", "infthor-eval moments SET --out SET/moments.csv")
 @click.argument("folder", metavar="SET", type=SET)
 @click.option("--out", required=True, type=PATH, help="CSV file to write.")
 @click.option(
     "--trajectories", type=PATH, help="Folder of the trajectories, if they are not in the set."
 )
-@click.option(
-    "--per-trajectory",
-    type=click.IntRange(2),
-    default=25,
-    show_default=True,
-    help="Pairs of one trajectory, at most; they come by two.",
+@default_option(
+    "--per-trajectory", click.IntRange(2), 25, "Pairs of one trajectory, at most; they come by two."
 )
 @click.option(
     "--rungs",
@@ -151,14 +143,10 @@ def moments(
     No second world is needed, and which moment is the later one tells nothing. Exit code 1 if a
     trajectory of the set cannot be read.
     """
-    from functools import partial
 
-    from infthor_eval.cli.progress.bar import PacedBar
     from infthor_eval.generation.moment_pairs import pair_moments
     from infthor_eval.generation.questions.generate import trajectory_folders
     from infthor_eval.nieh.scoring import score
-    from infthor_eval.storage.files import prepare_file
-    from infthor_eval.terminal import console, error_console, progress_bar
 
     ages = _parse_rungs(rungs)
     if not ages:
@@ -187,9 +175,7 @@ def moments(
 
 def _write(out: Path, questions: Sequence[Question], overwrite: bool) -> None:
     """Write a question file, and refuse to replace one that holds other questions."""
-    from infthor_eval.errors import wrap_errors
     from infthor_eval.formats.qa_csv import encode_questions
-    from infthor_eval.storage.files import refuse_overwrite, write_atomically
 
     content = encode_questions(questions)
     if not overwrite:
@@ -201,22 +187,17 @@ def _write(out: Path, questions: Sequence[Question], overwrite: bool) -> None:
         partial.write_bytes(content)
 
 
-@click.command("twins", cls=ExampleCommand, example="infthor-eval twins trajectories --out TWINS")
+@example_command("twins", "infthor-eval twins trajectories --out TWINS")
 @click.argument("trajectories", nargs=-1, required=True, type=PATH)
 @click.option("--out", required=True, type=PATH, help="Folder of the set, new or to be continued.")
 @click.option("--kinds", metavar="KIND,...", help="Kinds of edits, with commas; default: all.")
-@click.option(
-    "--per-trajectory",
-    type=click.IntRange(1),
-    default=25,
-    show_default=True,
-    help="Paired questions of one trajectory, at most.",
+@default_option(
+    "--per-trajectory", click.IntRange(1), 25, "Paired questions of one trajectory, at most."
 )
-@click.option(
+@default_option(
     "--per-kind",
-    type=click.IntRange(1),
+    click.IntRange(1),
     default=2,
-    show_default=True,
     help="Twins of one kind and trajectory, at most; twice as many edits are tried.",
 )
 @click.option(
@@ -225,9 +206,7 @@ def _write(out: Path, questions: Sequence[Question], overwrite: bool) -> None:
     help="Ask so many frames after the evidence, while both worlds look the same: 10,30,100,300; "
     "with placebo pairs. Default: at the end.",
 )
-@click.option(
-    "--seed", type=WholeNumber(0), default=0, show_default=True, help="Seed of every choice."
-)
+@default_option("--seed", WholeNumber(0), 0, "Seed of every choice.")
 @click.option("--limit", type=click.IntRange(1), help="Trajectories, at most.")
 @click.option(
     "--unity", is_flag=True, help="Use AI2-THOR's own Unity build, not the embedded simulator."
@@ -264,15 +243,11 @@ def twins(
     are done are not tried again. With --final-tasks, writes trajectories for the task
     infthor_twins. Exit code 1 if twins of a trajectory cannot be made at all.
     """
-    from functools import partial
 
-    from infthor_eval.cli.progress.bar import PacedBar
     from infthor_eval.generation.replay_set import select
     from infthor_eval.generation.twins.drafting import TwinSettings
     from infthor_eval.generation.twins.twin_set import make_final_tasks, make_twins
     from infthor_eval.nieh.scoring import score
-    from infthor_eval.storage.files import hold_folder
-    from infthor_eval.terminal import console, error_console, progress_bar
     from infthor_eval.thor import launch
     from infthor_eval.thor.supplement import supplement_file
 

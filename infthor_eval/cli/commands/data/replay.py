@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from infthor_eval.cli.help import ExampleCommand
-from infthor_eval.cli.options.values import PATH, floor_plans_option
+from infthor_eval.cli.help import example_command
+from infthor_eval.cli.options.values import PATH, default_option, floor_plans_option
 from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ _PUBLISHED_QUALITY = "MediumCloseFitShadows"
 _SIZE = click.IntRange(1, 8192)  # pixels
 
 
-@click.command("replay", cls=ExampleCommand, example="infthor-eval replay trajectories --out SET")
+@example_command("replay", "infthor-eval replay trajectories --out SET")
 @click.argument("trajectories", nargs=-1, required=True, type=PATH)
 @click.option("--out", required=True, type=PATH, help="Folder of the set, new or to be continued.")
 @floor_plans_option
@@ -42,13 +42,7 @@ _SIZE = click.IntRange(1, 8192)  # pixels
 @click.option(
     "--per-floor-plan", type=click.IntRange(1), help="Trajectories of one floor plan, at most."
 )
-@click.option(
-    "--frames",
-    type=click.IntRange(1),
-    default=1,
-    show_default=True,
-    help="Frames per move or turn.",
-)
+@default_option("--frames", click.IntRange(1), 1, "Frames per move or turn.")
 @click.option(
     "--unity", is_flag=True, help="Use AI2-THOR's own Unity build, not the embedded simulator."
 )

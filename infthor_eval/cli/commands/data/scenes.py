@@ -4,8 +4,10 @@ from pathlib import Path
 
 import click
 
-from infthor_eval.cli.help import ExampleCommand, ExampleGroup
-from infthor_eval.cli.options.values import PATH, SceneName, floor_plans_option
+from infthor_eval.cli.help import ExampleGroup
+from infthor_eval.cli.options.values import PATH, SceneName, default_option, floor_plans_option
+from infthor_eval.storage.files import hold_folder, prepare_file, refuse_overwrite, write_atomically
+from infthor_eval.terminal import print_line
 
 _PICTURES = (".png", ".jpg", ".jpeg")
 
@@ -15,19 +17,11 @@ def command() -> None:
     """Draw a scene (show); get scenes for machines without Unity (dump from Unity, or fetch)."""
 
 
-@command.command(
-    "show", cls=ExampleCommand, example="infthor-eval scenes show kitchen-3 --out kitchen.png"
-)
+@command.command("show", example="infthor-eval scenes show kitchen-3 --out kitchen.png")
 @click.argument("name", type=SceneName())
 @floor_plans_option
 @click.option("--out", type=PATH, help="Image to write; default: NAME.png.")
-@click.option(
-    "--size",
-    type=click.IntRange(64, 2048),
-    default=600,
-    show_default=True,
-    help="Width and height of each view, pixels.",
-)
+@default_option("--size", click.IntRange(64, 2048), 600, "Width and height of each view, pixels.")
 @click.option("--overwrite", is_flag=True, help="Replace a file with other content.")
 def show(name: str, data: Path | None, out: Path | None, size: int, overwrite: bool) -> None:
     """Draw scene NAME from above and from where an agent sees most of it, side by side."""
@@ -36,8 +30,6 @@ def show(name: str, data: Path | None, out: Path | None, size: int, overwrite: b
     from PIL import Image
 
     from infthor_eval.errors import wrap_errors
-    from infthor_eval.storage.files import prepare_file, refuse_overwrite, write_atomically
-    from infthor_eval.terminal import print_line
     from infthor_eval.thor.launch import embedded_launch
     from infthor_eval.thor.scenes import scene_pictures
     from infthor_eval.thor.simulator import Simulator
@@ -62,11 +54,7 @@ def show(name: str, data: Path | None, out: Path | None, size: int, overwrite: b
     print_line(f"{name}: {path} (from above; from where most is seen)")
 
 
-@command.command(
-    "dump",
-    cls=ExampleCommand,
-    example="infthor-eval scenes dump FloorPlan1 FloorPlan201 --out scenes",
-)
+@command.command("dump", example="infthor-eval scenes dump FloorPlan1 FloorPlan201 --out scenes")
 @click.argument("names", nargs=-1, required=True)
 @click.option("--out", type=PATH, required=True, help="Folder of floor plans, new or existing.")
 @click.option(
@@ -94,8 +82,6 @@ def dump(
 
     Other commands take that folder as --data, to run these scenes in the embedded simulator.
     """
-    from infthor_eval.storage.files import hold_folder
-    from infthor_eval.terminal import print_line
     from infthor_eval.thor import launch
     from infthor_eval.thor.scenes import dump_scene
     from infthor_eval.thor.simulator import Simulator
@@ -106,11 +92,7 @@ def dump(
             print_line(f"{name}: {dump_scene(simulator, name, out, overwrite)} objects in {out}")
 
 
-@command.command(
-    "fetch",
-    cls=ExampleCommand,
-    example="infthor-eval scenes fetch FloorPlan1 FloorPlan201 --out scenes",
-)
+@command.command("fetch", example="infthor-eval scenes fetch FloorPlan1 FloorPlan201 --out scenes")
 @click.argument("names", nargs=-1)
 @click.option("--out", type=PATH, required=True, help="Folder of floor plans, new or existing.")
 @click.option("--overwrite", is_flag=True, help="Replace other recordings of these scenes.")
@@ -120,8 +102,6 @@ def fetch(names: tuple[str, ...], out: Path, overwrite: bool, endpoint: str | No
 
     Other commands take that folder as --data, to run these scenes in the embedded simulator.
     """
-    from infthor_eval.storage.files import hold_folder
-    from infthor_eval.terminal import print_line
     from infthor_eval.thor.published_scenes import HOST, PUBLISHED_SCENES, fetch_scene
 
     unknown = [name for name in names if name not in PUBLISHED_SCENES]

@@ -8,9 +8,16 @@ from typing import Any, Literal
 import click
 from msgspec.structs import replace
 
-from infthor_eval.cli.help import ExampleCommand
+from infthor_eval.cli.help import example_command
 from infthor_eval.cli.options.run import RunOptions
-from infthor_eval.cli.options.values import PATH, SET, ModelList, ModelSpec, WholeNumber
+from infthor_eval.cli.options.values import (
+    PATH,
+    SET,
+    ModelList,
+    ModelSpec,
+    WholeNumber,
+    default_option,
+)
 from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
 from infthor_eval.cli.progress.notes import print_note, prints_as_notes
 from infthor_eval.cli.progress.runs import execute_runs
@@ -32,11 +39,7 @@ from infthor_eval.run import Run, with_distinct_names
 from infthor_eval.runs import RunOutcome, RunRequest, RunSummary, Suite, prepare_all
 
 
-@click.command(
-    "validate",
-    cls=ExampleCommand,
-    example="infthor-eval validate SET --model A,B,C,D --out VALIDATED",
-)
+@example_command("validate", "infthor-eval validate SET --model A,B,C,D --out VALIDATED")
 @click.argument("set_folder", metavar="SET", type=SET)
 @click.option(
     "--model",
@@ -56,9 +59,7 @@ from infthor_eval.runs import RunOutcome, RunRequest, RunSummary, Suite, prepare
     is_flag=True,
     help="Keep what a model answers in part, by the reference scorer, as the published filter did.",
 )
-@click.option(
-    "--seed", type=WholeNumber(), default=0, show_default=True, help="Seed of everything random."
-)
+@default_option("--seed", WholeNumber(), 0, "Seed of everything random.")
 @worker_options
 def command(
     set_folder: Path,
