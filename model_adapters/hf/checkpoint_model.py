@@ -107,6 +107,7 @@ class HfModel(CheckpointModel):
                 "repetition_penalty": generation.repetition_penalty,
                 "end_ids": sorted(generation.end_ids),
             },
+            **options.attention_identity(),
         }
 
     def close(self) -> None:

@@ -8,6 +8,7 @@ from msgspec import Meta
 
 from infthor_eval.quantities import Count, Total
 from infthor_eval.settings import Setting
+from model_adapters.options.attention import POSITIONS, UNITS, parse_attention
 
 _ATTENTION = ("eager", "sdpa", "flex_attention", "flash_attention_2", "flash_attention_3")
 # Implementation to the module that has it, and the package to install for it.
@@ -221,6 +222,24 @@ class HfOptions(Reading, Placement):
             "GPU."
         ),
     ] = False
+    attention: Annotated[
+        str | None,
+        Setting(
+            help="Which earlier tokens each one sees: sinks:N+window:N, window:N, "
+            "vertical-slash:SHARE or block-sparse:N; default: all (docs/engines.md)."
+        ),
+    ] = None
+    positions: Annotated[
+        str,
+        Setting(
+            help="With sinks, where those out of the window seem to be: as far as the window is "
+            "long, right before it in the cache, or where they are.",
+            choices=POSITIONS,
+        ),
+    ] = POSITIONS[0]
+    attention_unit: Annotated[
+        str, Setting(help="What attention sees or does not see as a whole.", choices=UNITS)
+    ] = UNITS[0]
     feature_cache_mb: Annotated[
         Count, Setting(help="Memory for vision features of earlier frames, in MiB.")
     ] = 128
@@ -237,6 +256,21 @@ class HfOptions(Reading, Placement):
     max_tokens: Annotated[
         Count | None, Setting(help="Context limit instead of the checkpoint's; 0 for none.")
     ] = None
+
+    def __post_init__(self) -> None:
+        if self.attention is not None:
+            parse_attention(self.attention)
+            if not self.share_prefix:
+                raise ValueError("attention needs share_prefix=true")
+        super().__post_init__()
+
+    def attention_identity(self) -> dict[str, Any]:
+        """Return what of sparse attention decides replies; nothing without it."""
+        if self.attention is None:
+            return {}
+        shape = parse_attention(self.attention)
+        positions = {"positions": self.positions} if getattr(shape, "sinks", 0) else {}
+        return {"attention": {"shape": self.attention, "unit": self.attention_unit, **positions}}
 
     def chunk_size(self, device_type: str) -> int:
         """Return most tokens of one forward pass on a device, by torch's name of its type."""

@@ -27,7 +27,11 @@ class _Branches:
         self._lengths = [prefix.tokens_in(n) for n in n_shared]  # tokens of each, with the prefix
         device = model.get_input_embeddings().weight.device
         self._attention = BranchAttention(
-            model.get_decoder().config, prefix.n_tokens, device, tuple(self._lengths)
+            model.get_decoder().config,
+            prefix.n_tokens,
+            device,
+            tuple(self._lengths),
+            prefix.sparse,
         )
 
     @torch.inference_mode()
@@ -86,7 +90,7 @@ class _Branches:
         for branch in owners:
             n_before.append(self._lengths[branch])
             self._lengths[branch] += 1
-        with self._attention.appended(owners, n_before):
+        with self._attention.appended(owners, n_before, positions):
             output = self._model(
                 **inputs,
                 position_ids=positions,

@@ -7,25 +7,26 @@ tokens have in prefix and continuation. So keys and values of the prefix are sto
 once for all continuations, as in Hydragen (arXiv:2402.05099).
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
 import torch
 from torch import Tensor
 from torch.nn.functional import scaled_dot_product_attention
-from transformers.masking_utils import AttentionMaskInterface
-from transformers.modeling_utils import ALL_ATTENTION_FUNCTIONS
 
-from infthor_eval.errors import ModelError
 from model_adapters.hf.cached.kv_cache import BufferedCache, cache_arguments
 from model_adapters.hf.prompting.embedding import Span
+from model_adapters.hf.sparse.interface import (
+    CannotAttendError,
+    MaskFunction,
+    attending,
+    require_plain,
+)
+from model_adapters.hf.sparse.layout import Layout
+from model_adapters.hf.sparse.reading import SparseReading
 
-_NOT_COMPUTED = ("softcap", "s_aux", "position_bias")  # what some models add to the scores
-
-
-class CannotBranchError(ModelError):
-    """A model attends in a way that `BranchAttention` cannot take the place of."""
+_HINT = "set batch_size=1"
 
 
 class _WatchedCache(BufferedCache):
@@ -68,14 +69,14 @@ def layer_windows(model: Any, words: Span) -> frozenset[int] | None:
         return None
     attention = BranchAttention(decoder.config, 0, words.positions.device)
     try:
-        with attention.appended([0, 1], [0, 0]):
+        with attention.appended([0, 1], [0, 0], words.positions):
             model(
                 **words.inputs,
                 position_ids=words.positions,
                 **cache_arguments(model, cache),
                 logits_to_keep=1,
             )
-    except CannotBranchError:
+    except CannotAttendError:
         return None
     return None if cache.was_measured else frozenset(attention.windows)
 
@@ -88,13 +89,19 @@ class BranchAttention:
         n_prefix: tokens of the prefix.
         seen: how many of them each branch continues; all where it is empty.
         device: device of the decoder's inputs.
+        sparse: how the prefix was read; None if every token sees all earlier ones.
 
     Attributes:
         windows: sizes of the windows and chunks that the model's masks had, in tokens.
     """
 
     def __init__(
-        self, config: Any, n_prefix: int, device: torch.device, seen: Sequence[int] = ()
+        self,
+        config: Any,
+        n_prefix: int,
+        device: torch.device,
+        seen: Sequence[int] = (),
+        sparse: SparseReading | None = None,
     ) -> None:
         self.windows: set[int] = set()
         self._config = config
@@ -105,41 +112,41 @@ class BranchAttention:
         self._branches = torch.empty(0, dtype=torch.long, device=device)
         # Position of every token, the prefix's too, in prefix and branch.
         self._positions = torch.arange(n_prefix, device=device)
+        self._window = None if sparse is None else sparse.window
+        self._layout = Layout.empty(device)
+        if sparse is not None and self._window is not None:  # not all is stored
+            self._layout = sparse.layout
+            self._positions = sparse.layout.number
+            self._n_prefix = len(self._positions)
         self._n_new = 0
         self._n_calls = 0
 
     @contextmanager
-    def appended(self, branches: Sequence[int], n_before: Sequence[int]) -> Iterator[None]:
+    def appended(
+        self, branches: Sequence[int], n_before: Sequence[int], positions: Tensor
+    ) -> Iterator[None]:
         """Attend this way within the context, in which the decoder is given more tokens once.
 
         Args:
             branches: the branch of each token.
             n_before: number of tokens before each in its branch and the prefix.
+            positions: their positions, (1, tokens) or (3, 1, tokens).
 
         Raises:
-            CannotBranchError: the decoder has layers that do not attend by transformers' interface,
+            CannotAttendError: the decoder has layers that do not attend by transformers' interface,
                 or with masks that are not made by transformers' functions of positions.
         """
         new = torch.tensor([branches, n_before]).to(self._branches.device)
         self._branches = torch.cat((self._branches, new[0]))
         self._positions = torch.cat((self._positions, new[1]))
+        if self._window is not None:
+            self._layout += Layout.of_words(new[1], positions)
         self._n_new = len(branches)
         self._n_calls = 0
-        name = f"branches_{id(self)}"
-        before = self._config._attn_implementation
-        # The functions are put into the dictionaries directly, because registered ones cannot be
-        # removed; transformers looks for masks in that of the class.
-        masks = AttentionMaskInterface._global_mapping
-        ALL_ATTENTION_FUNCTIONS[name] = self._attention
-        masks[name] = self._mask
-        self._config._attn_implementation = name
-        try:
+        with attending(self._config, f"branches_{id(self)}", self._attention, self._mask):
             yield
-        finally:
-            self._config._attn_implementation = before
-            del ALL_ATTENTION_FUNCTIONS[name], masks[name]
         if self._n_calls != self._config.num_hidden_layers:
-            raise CannotBranchError(
+            raise CannotAttendError(
                 "the model's layers do not all attend by transformers' interface; set batch_size=1"
             )
 
@@ -169,25 +176,31 @@ class BranchAttention:
             The outputs, (1, new tokens, heads, head size), and None instead of weights.
 
         Raises:
-            CannotBranchError: the model adds something to the scores, or gives a layer no mask.
+            CannotAttendError: the model adds something to the scores, or gives a layer no mask.
         """
-        added = [name for name in _NOT_COMPUTED if others.get(name) is not None]
-        if added:
-            raise CannotBranchError(f"the model's attention has {added[0]}; set batch_size=1")
-        if attention_mask is None:
-            raise CannotBranchError(
-                "the model's masks are not all made by transformers' functions; set batch_size=1"
-            )
+        mask = require_plain(attention_mask, others, _HINT)
         self._n_calls += 1
         n_key_heads = key.shape[1]
         # Heads that share keys become the second axis, along which a view repeats keys without a
         # copy.
         shared = (n_key_heads, query.shape[1] // n_key_heads)
+        if self._window is not None:
+            output = self._window.attend(
+                module.layer_idx,
+                query.unflatten(1, shared)[0],
+                key[0, :, None],
+                value[0, :, None],
+                rows=self._layout[-self._n_new :],
+                columns=self._layout,
+                seen=mask[0, 0],
+                scale=scaling,
+            )
+            return output.flatten(0, 1).transpose(0, 1)[None], None
         output = scaled_dot_product_attention(
             query.unflatten(1, shared)[0],
             key[0, :, None].expand(-1, shared[1], -1, -1),
             value[0, :, None].expand(-1, shared[1], -1, -1),
-            attn_mask=attention_mask[0, 0].to(query.device),  # a model can be on several devices
+            attn_mask=mask[0, 0].to(query.device),  # a model can be on several devices
             scale=scaling,
         )
         return output.flatten(0, 1).transpose(0, 1)[None], None
@@ -195,7 +208,7 @@ class BranchAttention:
     def _mask(
         self,
         *,
-        mask_function: Callable[..., Tensor],
+        mask_function: MaskFunction,
         use_vmap: bool = False,
         local_size: int | None = None,
         **others: Any,
@@ -210,10 +223,10 @@ class BranchAttention:
             others: sizes of the sequence, which are known here.
 
         Raises:
-            CannotBranchError: the model adds a rule of its own.
+            CannotAttendError: the model adds a rule of its own.
         """
         if use_vmap:
-            raise CannotBranchError("the model adds rules of its own to masks; set batch_size=1")
+            raise CannotAttendError("the model adds rules of its own to masks; set batch_size=1")
         if local_size is not None:
             self.windows.add(local_size)
         first = self._positions.new_zeros(1, 1, 1, 1)  # the only batch, and any head

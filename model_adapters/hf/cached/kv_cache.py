@@ -70,6 +70,7 @@ class BufferedCache(Cache):
         self._allocation = _Allocation(storage)
         self._linear = _linear_layers(config)
         self._states = _LinearStates([*self._linear.values()]) if self._linear else None
+        self._n_dropped = 0
         super().__init__(layers=[])
         if self._linear:  # masks of such a model are made by its first layer that attends
             self._create_layers(config.num_hidden_layers)
@@ -86,9 +87,22 @@ class BufferedCache(Cache):
         self._create_layers(layer_idx + 1)
         return super().update(key_states, value_states, layer_idx, *args, **kwargs)
 
+    @property
+    def n_read(self) -> int:
+        """Tokens of the sequence, with those that were dropped."""
+        return self.get_seq_length() + self._n_dropped
+
     def reserve(self, n_tokens: int) -> None:
         """Set the capacity of buffers allocated from now on, so that they need not grow."""
         self._allocation.capacity = -(-n_tokens // _STEP) * _STEP
+
+    @torch.inference_mode()
+    def drop(self, begin: int, end: int) -> None:
+        """Forget the stored tokens of these places; memory stays allocated."""
+        for layer in self.layers:
+            if isinstance(layer, BufferedLayer) and end > begin:
+                layer.drop(begin, end)
+        self._n_dropped += end - begin
 
     def lengthen(self, n_tokens: int) -> None:
         """Append so many tokens to every layer with keys, each with the keys and values of the last
@@ -106,20 +120,23 @@ class BufferedCache(Cache):
     def mark(self) -> None:
         """Let the cache be cut here later, if it needs marks."""
         if self._states is not None:
-            self._states.mark(self.get_seq_length())
+            self._states.mark(self.n_read)
 
     def cut_before(self, n_tokens: int) -> int:
         """Return the most tokens, of so many, behind which the cache can be cut."""
-        if self._states is None or n_tokens == self.get_seq_length():
+        if self._states is None or n_tokens == self.n_read:
             return n_tokens
         return self._states.nearest(n_tokens)
 
     def truncate(self, n_tokens: int) -> None:
         """Keep the first `n_tokens` tokens, one of the numbers of `cut_before`; memory stays
         allocated."""
-        excess = self.get_seq_length() - n_tokens
+        excess = self.n_read - n_tokens
         if excess <= 0:
             return
+        if not n_tokens:
+            excess -= self._n_dropped
+            self._n_dropped = 0
         for layer in self.layers:
             if isinstance(layer, BufferedLayer):
                 layer.crop(-excess)
@@ -170,6 +187,14 @@ class BufferedLayer(DynamicLayer):
         self.keys = keys[..., :new, :]
         self.values = values[..., :new, :]
         return self.keys.to(key_states.device), self.values.to(value_states.device)
+
+    def drop(self, begin: int, end: int) -> None:
+        """Forget the tokens of these places."""
+        assert self._buffers is not None  # there are tokens
+        n_kept = self.get_seq_length() - (end - begin)
+        for buffer, used in zip(self._buffers, (self.keys, self.values), strict=True):
+            buffer[..., begin:n_kept, :] = used[..., end:, :].clone()
+        self.keys, self.values = (buffer[..., :n_kept, :] for buffer in self._buffers)
 
     def _grow(
         self, like: torch.Tensor, old: int, capacity: int, used: torch.Tensor | None

@@ -18,6 +18,11 @@ from model_adapters.hf.loading.loaded import LoadedCheckpoint
 from model_adapters.hf.loading.rope import take_length_rope
 from model_adapters.hf.prompting.ahead import Ahead
 from model_adapters.hf.prompting.prompt import Piece, n_common, n_nested, n_tokens, token_ids
+from model_adapters.hf.sparse.chosen import ChosenAttention
+from model_adapters.hf.sparse.reading import SparseReading
+from model_adapters.hf.sparse.rotation import find_rotations
+from model_adapters.hf.sparse.window import WindowAttention
+from model_adapters.options.attention import AttentionShape, Window, parse_attention
 from model_adapters.options.checkpoints import HfOptions
 from model_adapters.protocols import Decoding, Reply, Turn
 
@@ -45,6 +50,34 @@ class TransformersModel(HfModel):
             rope=self._rope,
             storage=torch.device("cpu") if options.kv_offload else None,
         )
+        if options.attention is not None:
+            self._prefix.sparse = self._read_sparsely(parse_attention(options.attention))
+
+    def _read_sparsely(self, shape: AttentionShape) -> SparseReading:
+        """Return how sequences are read by the options.
+
+        Raises:
+            ModelError: the model attends, or has positions, in a way that does not allow it.
+        """
+        options = self._options
+        if self.windows is None:
+            raise ModelError(
+                f"{self.name}: attention={options.attention} needs a model all of whose layers "
+                "attend by transformers' interface, without caps or states, with one set of rotary "
+                "frequencies; leave it out"
+            )
+        rule: WindowAttention | ChosenAttention
+        if isinstance(shape, Window):
+            positions = options.positions if shape.sinks else "absolute"
+            is_turned = positions != "absolute"
+            rotations = find_rotations(self._loaded.model, self._embed) if is_turned else ()
+            rule = WindowAttention(shape, positions, rotations)
+        else:
+            rule = ChosenAttention(shape)
+        weight = self._loaded.model.get_input_embeddings().weight
+        config = self._loaded.model.get_decoder().config
+        by_frames = options.attention_unit == "frames"
+        return SparseReading(config, rule, weight.device, by_frames=by_frames)
 
     def fix_rope(self, n_positions: int) -> None:
         """Give all sequences of a training the rotary frequencies of one length, where they depend
@@ -152,6 +185,9 @@ class TransformersModel(HfModel):
         if len(prompts) == 1:
             return []
         shared = n_nested(prompts)
+        if self._prefix.sparse is not None:
+            # Beginnings of what is read are not what is read of them alone, or are dropped.
+            return shared if len(set(shared)) == 1 else []
         if not shared and not self._embed.sees_ahead:
             shared = [n_common(prompts)] * len(prompts)
         return shared

@@ -8,7 +8,8 @@ pass only by rounding.
 
 from bisect import bisect_right
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
+from itertools import accumulate
 from typing import Any
 
 import torch
@@ -18,6 +19,7 @@ from model_adapters.hf.family import Family
 from model_adapters.hf.loading.rope import LengthRope
 from model_adapters.hf.prompting.embedding import Embed
 from model_adapters.hf.prompting.prompt import Piece, n_tokens, token_ids
+from model_adapters.hf.sparse.reading import SparseReading
 
 
 class Prefix:
@@ -32,6 +34,7 @@ class Prefix:
         rope: rotary embeddings of the model if their frequencies depend on the prompt's length,
             else None.
         storage: device of keys and values; the device of the weights where None.
+        sparse: which tokens see which; all earlier ones where None.
     """
 
     def __init__(
@@ -43,6 +46,7 @@ class Prefix:
         chunk_tokens: int,
         rope: LengthRope | None = None,
         storage: torch.device | None = None,
+        sparse: SparseReading | None = None,
     ) -> None:
         self._model = model
         self._family = family
@@ -51,6 +55,7 @@ class Prefix:
         self._storage = storage
         self._embed = embed
         self._chunk_tokens = chunk_tokens
+        self.sparse = sparse
         self.reset()
 
     def reset(self) -> None:
@@ -60,6 +65,9 @@ class Prefix:
         self._ends: list[int] = []  # tokens up to the end of each piece
         # Position behind everything before each piece, and of the next token.
         self._starts: list[int] = [0]
+        self._chunk_ends: list[int] = []  # pieces up to the end of each chunk before what is asked
+        if self.sparse is not None:
+            self.sparse.reset()
 
     @property
     def n_tokens(self) -> int:
@@ -93,7 +101,8 @@ class Prefix:
     def extended(self, continuations: Sequence[Sequence[Piece]], reserve: int) -> Iterator[None]:
         """Let others append to the cache within the context, what these continuations and some more
         tokens need."""
-        self._cache.reserve(self.n_tokens + sum(map(n_tokens, continuations)) + reserve)
+        n_stored = self._cache.get_seq_length()
+        self._cache.reserve(n_stored + sum(map(n_tokens, continuations)) + reserve)
         done = False
         try:
             yield
@@ -120,10 +129,26 @@ class Prefix:
             if ours is not theirs and ours != theirs:
                 break
             shared += 1
-        n_tokens = self._cache.cut_before(self.tokens_in(shared))
+        n_tokens = self._cache.cut_before(self.tokens_in(self._whole_chunks(pieces, shared)))
+        if self.sparse is not None:
+            n_tokens = self.sparse.cut_before(n_tokens)
         shared = bisect_right(self._ends, n_tokens, hi=shared)
         self.cut(shared)
         return shared
+
+    def _whole_chunks(self, pieces: Sequence[Piece], shared: int) -> int:
+        """Return how many of the shared pieces are encoded as they would be with these alone: as
+        many as are in the same chunks, if that decides what tokens see."""
+        if self.sparse is None or not self.sparse.goes_by_chunks:
+            return shared
+        shown, _ = self._parts(pieces)
+        ends = [*accumulate(len(chunk) for chunk in chunks(shown, self._chunk_tokens))]
+        n_same = 0
+        for ours, theirs in zip(self._chunk_ends, ends, strict=False):
+            if ours != theirs or ours > shared:
+                break
+            n_same = ours
+        return shared if n_same == len(shown) else n_same
 
     def _set_rope(self, rope: LengthRope, pieces: Sequence[Piece]) -> None:
         """Set the rotary frequencies for a prompt; a sequence encoded with others is dropped."""
@@ -138,7 +163,10 @@ class Prefix:
     def cut(self, n_pieces: int) -> None:
         """Keep the first `n_pieces` pieces."""
         del self._pieces[n_pieces:], self._ends[n_pieces:], self._starts[n_pieces + 1 :]
+        self._chunk_ends = [end for end in self._chunk_ends if end <= n_pieces]
         self._cache.truncate(self.n_tokens)
+        if self.sparse is not None:
+            self.sparse.cut(self.n_tokens)
 
     def lengthen(self, n_tokens: int) -> None:
         """Take so many tokens of text as encoded behind the sequence, each like its last token: for
@@ -160,16 +188,22 @@ class Prefix:
         Returns:
             Logits of the token that follows the last piece, (vocabulary,).
         """
-        self._cache.reserve(self.n_tokens + n_tokens(pieces) + reserve)
         self._embed.expect(pieces)
         logits = None
         shown, asked = self._parts(pieces)
+        n_stored = self.n_tokens + n_tokens(shown)
+        if self.sparse is not None:
+            n_stored = self.sparse.most_stored(n_stored, self._chunk_tokens)
+        self._cache.reserve(n_stored + n_tokens(asked) + reserve)
         for chunk in chunks(shown, self._chunk_tokens):
+            if self.sparse is not None:
+                self.sparse.drop_unseen(self._cache, self.n_tokens)
             logits = self._forward(chunk)
+            self._chunk_ends.append(self.n_pieces)
         if shown:
             self._cache.mark()
         for chunk in chunks(asked, self._chunk_tokens):
-            logits = self._forward(chunk)
+            logits = self._forward(chunk, is_asked=True)
         if logits is None:
             raise ValueError("nothing to feed")
         return logits
@@ -177,21 +211,31 @@ class Prefix:
     def _parts(self, pieces: Sequence[Piece]) -> tuple[Sequence[Piece], Sequence[Piece]]:
         """Return pieces up to the last frame, behind which prompts on the same frames differ, and
         the others; a cache that can be cut anywhere gets all at once."""
+        if not (self._cache.needs_marks or self.sparse is not None):
+            return (), pieces
         ends = [at for at, piece in enumerate(pieces, 1) if not isinstance(piece, int)]
-        n = ends[-1] if ends and self._cache.needs_marks else 0
+        n = ends[-1] if ends else 0
+        if not ends and self.sparse is not None and not self.sparse.goes_by_chunks:
+            n = max(0, len(pieces) - self._chunk_tokens)  # so that a long text is dropped, too
         return pieces[:n], pieces[n:]
 
     @torch.inference_mode()
-    def _forward(self, chunk: list[Piece]) -> torch.Tensor:
+    def _forward(self, chunk: list[Piece], *, is_asked: bool = False) -> torch.Tensor:
         span = self._embed(chunk, self._starts[-1], self._pieces)
+        attending = (
+            nullcontext()
+            if self.sparse is None
+            else self.sparse.appended(chunk, self.n_tokens, span.positions, is_asked=is_asked)
+        )
         done = False
         try:
-            output = self._model(
-                **span.inputs,
-                position_ids=span.positions,
-                **cache_arguments(self._model, self._cache),
-                logits_to_keep=1,
-            )
+            with attending:
+                output = self._model(
+                    **span.inputs,
+                    position_ids=span.positions,
+                    **cache_arguments(self._model, self._cache),
+                    logits_to_keep=1,
+                )
             done = True
         finally:
             if not done:  # some layers have cached the chunk and others have not

@@ -1,0 +1,1 @@
+"""Sparse attention: which earlier tokens each token sees, computed for those alone."""

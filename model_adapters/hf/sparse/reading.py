@@ -1,0 +1,153 @@
+"""Sparse attention of the one sequence that a model has encoded."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from functools import partial
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from model_adapters.hf.cached.kv_cache import BufferedCache
+from model_adapters.hf.prompting.prompt import Piece
+from model_adapters.hf.sparse.chosen import ChosenAttention
+from model_adapters.hf.sparse.interface import (
+    CannotAttendError,
+    MaskFunction,
+    attending,
+    require_plain,
+    seen_by,
+)
+from model_adapters.hf.sparse.layout import Layout
+from model_adapters.hf.sparse.window import WindowAttention
+
+_HINT = "leave attention out"
+
+
+class SparseReading:
+    """How a sequence is read: which tokens see which, and what its cache need not keep.
+
+    Args:
+        config: config of the decoder.
+        rule: which tokens see which.
+        device: device of the decoder's inputs.
+        by_frames: True if frames are seen, or not, as a whole.
+    """
+
+    def __init__(
+        self,
+        config: Any,
+        rule: WindowAttention | ChosenAttention,
+        device: torch.device,
+        *,
+        by_frames: bool,
+    ) -> None:
+        self._config = config
+        self._rule = rule
+        self._by_frames = by_frames
+        self._device = device
+        self.reset()
+
+    def reset(self) -> None:
+        """Begin a sequence."""
+        self.layout = Layout.empty(self._device)
+        self._masks: list[MaskFunction] = []
+        self._n_calls = 0
+
+    @property
+    def window(self) -> WindowAttention | None:
+        """The rule, if it is one of all tokens, of replies too."""
+        return self._rule if isinstance(self._rule, WindowAttention) else None
+
+    @property
+    def goes_by_chunks(self) -> bool:
+        """True if what a token sees depends on those that it is encoded with."""
+        return self.window is None
+
+    def most_stored(self, n_tokens: int, chunk_tokens: int) -> int:
+        """Return how many of so many tokens a cache keeps while they are read in chunks."""
+        if self.window is None:
+            return n_tokens
+        return min(n_tokens, self.window.shape.sinks + self.window.shape.window + chunk_tokens)
+
+    def cut_before(self, n_tokens: int) -> int:
+        """Return the most tokens, of so many, behind which the sequence can be cut."""
+        if self.window is None or n_tokens >= self.window.first_seen(self.layout):
+            return n_tokens
+        return 0
+
+    def cut(self, n_tokens: int) -> None:
+        """Keep the first tokens, as many as `cut_before` has."""
+        self.layout = self.layout[self.layout.number < n_tokens]
+
+    def drop_unseen(self, cache: BufferedCache, n_tokens: int) -> None:
+        """Drop what no token behind so many sees."""
+        if self.window is not None:
+            begin = self.window.n_sinks(self.layout)
+            end = begin + self.window.n_unseen(self.layout, n_tokens)
+            cache.drop(begin, end)
+            self.layout = self.layout[:begin] + self.layout[end:]
+
+    @contextmanager
+    def appended(
+        self, pieces: Sequence[Piece], start: int, positions: Tensor, *, is_asked: bool
+    ) -> Iterator[None]:
+        """Attend this way within the context, in which the decoder is given more pieces once.
+
+        Args:
+            pieces: the pieces, of which the first token has the number `start`.
+            start: tokens of the sequence before them.
+            positions: positions of their tokens, (1, tokens) or (3, 1, tokens).
+            is_asked: True behind the last frame: what is asked, and replies, see all keys where
+                these are chosen for chunks.
+
+        Raises:
+            CannotAttendError: the decoder's layers do not all attend by transformers' interface.
+        """
+        self.layout += Layout.of(pieces, start, positions, by_frames=self._by_frames)
+        if is_asked and self.goes_by_chunks:
+            yield
+            return
+        self._masks = []
+        self._n_calls = 0
+        with attending(self._config, f"sparse_{id(self)}", self._attention, self._mask):
+            yield
+        if self._n_calls != self._config.num_hidden_layers:
+            raise CannotAttendError(
+                f"the model's layers do not all attend by transformers' interface; {_HINT}"
+            )
+
+    def _attention(
+        self,
+        module: Any,
+        query: Tensor,
+        key: Tensor,
+        value: Tensor,
+        attention_mask: Tensor | None,
+        *,
+        scaling: float | None = None,
+        **others: Any,
+    ) -> tuple[Tensor, None]:
+        """Return the attention of the new tokens, in the form of transformers' functions."""
+        mask = self._masks[int(require_plain(attention_mask, others, _HINT).flatten()[0])]
+        self._n_calls += 1
+        n_key_heads = key.shape[1]
+        output = self._rule.attend_in_order(
+            module.layer_idx,
+            query.unflatten(1, (n_key_heads, query.shape[1] // n_key_heads))[0],
+            key[0, :, None],
+            value[0, :, None],
+            columns=self.layout,
+            seen=partial(seen_by, mask),
+            scale=scaling,
+        )
+        return output.flatten(0, 1).transpose(0, 1)[None], None
+
+    def _mask(
+        self, *, mask_function: MaskFunction, use_vmap: bool = False, **_others: Any
+    ) -> Tensor:
+        """Return the number of a rule, in place of a mask as long as the context."""
+        if use_vmap:
+            raise CannotAttendError(f"the model adds rules of its own to masks; {_HINT}")
+        self._masks.append(mask_function)
+        return torch.full((1, 1, 1, 1), len(self._masks) - 1, device=self._device)

@@ -1,0 +1,156 @@
+"""Attention to the first tokens and the last ones (LM-Infinite, arXiv:2308.16137; StreamingLLM,
+arXiv:2309.17453)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from model_adapters.hf.sparse.interface import SeenBy
+from model_adapters.hf.sparse.kernel import Keys, attend, attend_to_both
+from model_adapters.hf.sparse.layout import Layout
+from model_adapters.hf.sparse.rotation import Rotation
+from model_adapters.options.attention import Window
+
+_BLOCK = 256  # queries that are computed together
+
+
+@dataclass(frozen=True)
+class WindowAttention:
+    """Which tokens see which, and where the first ones seem to be.
+
+    A token sees `sinks` first tokens and the `window` last ones, itself among them. With frames as
+    a whole, a frame is seen if all of it is among these; a token sees its own frame in any case.
+
+    Attributes:
+        shape: sizes.
+        positions: where a token sees the first ones that are out of its window: "ceiling": all as
+            far as the window is long; "cache": right before the window; "absolute": where they are.
+        rotations: how each layer turns to positions; empty with absolute ones.
+    """
+
+    shape: Window
+    positions: str = "absolute"
+    rotations: Sequence[Rotation] = ()
+
+    def n_sinks(self, layout: Layout) -> int:
+        """Return how many of the stored tokens are first ones, which are stored first."""
+        return int((layout.last < self.shape.sinks).sum())
+
+    def n_unseen(self, layout: Layout, number: int) -> int:
+        """Return how many tokens behind the first ones no token from a number on sees."""
+        return int(((number - layout.first >= self.shape.window) & self._is_no_sink(layout)).sum())
+
+    def first_seen(self, layout: Layout) -> int:
+        """Return behind how many tokens a sequence can be cut, at least, so that later ones see
+        what they must; 0 if nothing was dropped."""
+        n_sinks = self.n_sinks(layout)
+        if len(layout) == n_sinks or int(layout.number[n_sinks]) == n_sinks:
+            return 0
+        return int(layout.first[n_sinks]) + self.shape.window - 1
+
+    def attend(
+        self,
+        layer: int,
+        query: Tensor,
+        key: Tensor,
+        value: Tensor,
+        *,
+        rows: Layout,
+        columns: Layout,
+        seen: Tensor,
+        scale: float | None,
+    ) -> Tensor:
+        """Return the attention of some queries on all stored tokens; like `query`.
+
+        Args:
+            layer: number of the layer.
+            query: (key heads, heads that share one, queries, head size).
+            key, value: (key heads, 1, stored tokens, head size).
+            rows: layout of the queries.
+            columns: layout of the stored tokens.
+            seen: which of them each query may see by the model's own rule, (queries, stored).
+            scale: factor of dot products.
+        """
+        near = self._near(rows, columns) & seen
+        n_sinks = self.n_sinks(columns)
+        far = seen[:, :n_sinks] & ~near[:, :n_sinks]
+        if self.positions == "absolute" or not bool(far.any()):
+            near[:, :n_sinks] |= far
+            return attend(query, Keys(key, value, near), scale)
+        turned, sinks = self._turn(
+            self.rotations[layer], query, key[..., :n_sinks, :], rows, columns, near
+        )
+        others = Keys(sinks, value[..., :n_sinks, :], far)
+        return attend_to_both(query, Keys(key, value, near), turned, others, scale)
+
+    def attend_in_order(
+        self,
+        layer: int,
+        query: Tensor,
+        key: Tensor,
+        value: Tensor,
+        *,
+        columns: Layout,
+        seen: SeenBy,
+        scale: float | None,
+    ) -> Tensor:
+        """Return the attention of queries that are the last of the stored tokens, in order; see
+        `attend`. What none of a block of them sees is not computed."""
+        n = query.shape[-2]
+        rows = columns[len(columns) - n :]
+        n_sinks = self.n_sinks(columns)
+        parts = []
+        for at in range(0, n, _BLOCK):
+            block = rows[at : at + _BLOCK]
+            oldest = min(int(block.number[0]) - self.shape.window + 1, int(block.first[0]))
+            begin = max(int(torch.searchsorted(columns.first, oldest)), n_sinks)
+            end = len(columns) - n + at + len(block)
+            places = _joined(n_sinks, begin, end, query.device)
+            parts.append(
+                self.attend(
+                    layer,
+                    query[..., at : at + _BLOCK, :],
+                    key[..., places, :],
+                    value[..., places, :],
+                    rows=block,
+                    columns=columns[places],
+                    seen=seen(block.number, columns.number[places]),
+                    scale=scale,
+                )
+            )
+        return torch.cat(parts, dim=-2)
+
+    def _near(self, rows: Layout, columns: Layout) -> Tensor:
+        distance = rows.number[:, None] - columns.first
+        return (distance < self.shape.window) | (columns.first == rows.first[:, None])
+
+    def _is_no_sink(self, layout: Layout) -> Tensor:
+        return layout.last >= self.shape.sinks
+
+    def _turn(
+        self,
+        rotation: Rotation,
+        query: Tensor,
+        sinks: Tensor,
+        rows: Layout,
+        columns: Layout,
+        near: Tensor,
+    ) -> tuple[Tensor, Tensor]:
+        """Return queries and first keys so that their distance is what it is to seem."""
+        n_sinks = sinks.shape[-2]
+        if self.positions == "ceiling":
+            unturned = rotation.turn(sinks, -columns.position[:n_sinks])
+            return rotation.turn(query, self.shape.window - rows.position), unturned
+        begins = columns.position[near.int().argmax(dim=-1)]  # of each query's window
+        gap = (begins - columns.behind[n_sinks - 1]).clamp(min=0)
+        return rotation.turn(query, -gap), sinks
+
+
+def _joined(n_first: int, begin: int, end: int, device: torch.device) -> slice | Tensor:
+    """Return the places of the first tokens and of those from `begin` to `end`."""
+    if begin == n_first:
+        return slice(0, end)
+    first = torch.arange(n_first, device=device)
+    return torch.cat((first, torch.arange(begin, end, device=device)))
