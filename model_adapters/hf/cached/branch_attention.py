@@ -185,15 +185,13 @@ class BranchAttention:
         # copy.
         shared = (n_key_heads, query.shape[1] // n_key_heads)
         if self._window is not None:
-            output = self._window.attend(
+            rows = self._layout[-self._n_new :]
+            output = self._window.part(rows, self._layout, mask[0, 0])(
                 module.layer_idx,
                 query.unflatten(1, shared)[0],
                 key[0, :, None],
                 value[0, :, None],
-                rows=self._layout[-self._n_new :],
-                columns=self._layout,
-                seen=mask[0, 0],
-                scale=scaling,
+                scaling,
             )
             return output.flatten(0, 1).transpose(0, 1)[None], None
         output = scaled_dot_product_attention(

@@ -186,11 +186,22 @@ class TransformersModel(HfModel):
             return []
         shared = n_nested(prompts)
         if self._prefix.sparse is not None:
-            # Beginnings of what is read are not what is read of them alone, or are dropped.
-            return shared if len(set(shared)) == 1 else []
+            return self._n_read_alike(prompts, shared)
         if not shared and not self._embed.sees_ahead:
             shared = [n_common(prompts)] * len(prompts)
         return shared
+
+    def _n_read_alike(self, prompts: Sequence[Sequence[Piece]], shared: list[int]) -> list[int]:
+        """Return how many pieces of prompts are read sparsely as they are of each alone, of so many
+        that they share; nothing where not.
+
+        Beginnings of what is read are dropped, or were read by what comes later; so is a text by
+        the chunk that it shares with what is asked.
+        """
+        sparse = self._prefix.sparse
+        is_text = all(isinstance(piece, int) for piece in prompts[0])
+        by_chunks = sparse is not None and sparse.goes_by_chunks and is_text
+        return shared if len(set(shared)) == 1 and not by_chunks else []
 
     def _decode_each(
         self, prompts: Sequence[Sequence[Piece]], replies: Sequence[ReplyState]

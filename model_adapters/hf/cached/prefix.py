@@ -215,8 +215,8 @@ class Prefix:
             return (), pieces
         ends = [at for at, piece in enumerate(pieces, 1) if not isinstance(piece, int)]
         n = ends[-1] if ends else 0
-        if not ends and self.sparse is not None and not self.sparse.goes_by_chunks:
-            n = max(0, len(pieces) - self._chunk_tokens)  # so that a long text is dropped, too
+        if not ends and self.sparse is not None:  # of a text, whole chunks
+            n = len(pieces) // self._chunk_tokens * self._chunk_tokens
         return pieces[:n], pieces[n:]
 
     @torch.inference_mode()

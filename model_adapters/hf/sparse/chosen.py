@@ -2,12 +2,13 @@
 arXiv:2407.02490)."""
 
 from collections.abc import Iterator
+from functools import partial
 from typing import Protocol
 
 import torch
 from torch import Tensor
 
-from model_adapters.hf.sparse.interface import SeenBy
+from model_adapters.hf.sparse.interface import Plan, SeenBy
 from model_adapters.hf.sparse.kernel import Keys, attend
 from model_adapters.hf.sparse.layout import Layout
 from model_adapters.options.attention import BlockSparse, VerticalSlash
@@ -37,18 +38,20 @@ class ChosenAttention:
     def __init__(self, shape: VerticalSlash | BlockSparse) -> None:
         self._shape = shape
 
-    def attend_in_order(
+    def plan(self, columns: Layout, _n_queries: int, seen: SeenBy) -> Plan:
+        """See `WindowAttention.plan`."""
+        return partial(self._attend, columns, seen)
+
+    def _attend(
         self,
-        layer: int,
+        columns: Layout,
+        seen: SeenBy,
+        _layer: int,
         query: Tensor,
         key: Tensor,
         value: Tensor,
-        *,
-        columns: Layout,
-        seen: SeenBy,
         scale: float | None,
     ) -> Tensor:
-        """See `WindowAttention.attend_in_order`."""
         n = query.shape[-2]
         rows = columns[len(columns) - n :]
         if n <= _LAST:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, Protocol
 
 from torch import Tensor
 from transformers.masking_utils import AttentionMaskInterface
@@ -15,6 +15,22 @@ _NOT_COMPUTED = ("softcap", "s_aux", "position_bias")  # what some models add to
 MaskFunction = Callable[[Tensor, Tensor, Tensor, Tensor], Tensor]
 # Whether tokens of these numbers see those of others, (queries, keys).
 SeenBy = Callable[[Tensor, Tensor], Tensor]
+
+
+class Plan(Protocol):
+    """Attention of given queries on given keys, in each layer."""
+
+    def __call__(
+        self, layer: int, query: Tensor, key: Tensor, value: Tensor, scale: float | None, /
+    ) -> Tensor:
+        """Return the attention; like `query`.
+
+        Args:
+            layer: number of the layer.
+            query: (key heads, heads that share one, queries, head size).
+            key, value: (key heads, 1, stored tokens, head size).
+            scale: factor of dot products; by the head size where None.
+        """
 
 
 class CannotAttendError(ModelError):

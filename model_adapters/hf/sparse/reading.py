@@ -14,6 +14,7 @@ from model_adapters.hf.sparse.chosen import ChosenAttention
 from model_adapters.hf.sparse.interface import (
     CannotAttendError,
     MaskFunction,
+    Plan,
     attending,
     require_plain,
     seen_by,
@@ -52,6 +53,7 @@ class SparseReading:
         """Begin a sequence."""
         self.layout = Layout.empty(self._device)
         self._masks: list[MaskFunction] = []
+        self._plans: dict[int, Plan] = {}  # by the mask
         self._n_calls = 0
 
     @property
@@ -109,6 +111,7 @@ class SparseReading:
             yield
             return
         self._masks = []
+        self._plans = {}
         self._n_calls = 0
         with attending(self._config, f"sparse_{id(self)}", self._attention, self._mask):
             yield
@@ -129,17 +132,18 @@ class SparseReading:
         **others: Any,
     ) -> tuple[Tensor, None]:
         """Return the attention of the new tokens, in the form of transformers' functions."""
-        mask = self._masks[int(require_plain(attention_mask, others, _HINT).flatten()[0])]
+        mask = int(require_plain(attention_mask, others, _HINT).flatten()[0])
+        if mask not in self._plans:  # it is the same in all layers of a mask
+            seen = partial(seen_by, self._masks[mask])
+            self._plans[mask] = self._rule.plan(self.layout, query.shape[2], seen)
         self._n_calls += 1
         n_key_heads = key.shape[1]
-        output = self._rule.attend_in_order(
+        output = self._plans[mask](
             module.layer_idx,
             query.unflatten(1, (n_key_heads, query.shape[1] // n_key_heads))[0],
             key[0, :, None],
             value[0, :, None],
-            columns=self.layout,
-            seen=partial(seen_by, mask),
-            scale=scaling,
+            scaling,
         )
         return output.flatten(0, 1).transpose(0, 1)[None], None
 

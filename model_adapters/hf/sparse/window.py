@@ -3,11 +3,12 @@ arXiv:2309.17453)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import torch
 from torch import Tensor
 
-from model_adapters.hf.sparse.interface import SeenBy
+from model_adapters.hf.sparse.interface import Plan, SeenBy
 from model_adapters.hf.sparse.kernel import Keys, attend, attend_to_both
 from model_adapters.hf.sparse.layout import Layout
 from model_adapters.hf.sparse.rotation import Rotation
@@ -50,77 +51,66 @@ class WindowAttention:
             return 0
         return int(layout.first[n_sinks]) + self.shape.window - 1
 
-    def attend(
-        self,
-        layer: int,
-        query: Tensor,
-        key: Tensor,
-        value: Tensor,
-        *,
-        rows: Layout,
-        columns: Layout,
-        seen: Tensor,
-        scale: float | None,
-    ) -> Tensor:
-        """Return the attention of some queries on all stored tokens; like `query`.
+    def plan(self, columns: Layout, n_queries: int, seen: SeenBy) -> Plan:
+        """Return the attention of the last of the stored tokens, in order; see `Plan`.
+
+        What none of a block of queries sees is not computed.
+        """
+        rows = columns[len(columns) - n_queries :]
+        n_sinks = self.n_sinks(columns)
+        parts = []
+        for at in range(0, n_queries, _BLOCK):
+            block = rows[at : at + _BLOCK]
+            oldest = min(int(block.number[0]) - self.shape.window + 1, int(block.first[0]))
+            begin = max(int(torch.searchsorted(columns.first, oldest)), n_sinks)
+            end = len(columns) - n_queries + at + len(block)
+            places = _joined(n_sinks, begin, end, columns.number.device)
+            among = columns[places]
+            parts.append((places, self.part(block, among, seen(block.number, among.number))))
+
+        def attend_in_order(
+            layer: int, query: Tensor, key: Tensor, value: Tensor, scale: float | None
+        ) -> Tensor:
+            outputs = [
+                part(layer, queries, key[..., places, :], value[..., places, :], scale)
+                for (places, part), queries in zip(parts, query.split(_BLOCK, -2), strict=True)
+            ]
+            return torch.cat(outputs, dim=-2)
+
+        return attend_in_order
+
+    def part(self, rows: Layout, columns: Layout, seen: Tensor) -> Plan:
+        """Return the attention of some queries on some stored tokens.
 
         Args:
-            layer: number of the layer.
-            query: (key heads, heads that share one, queries, head size).
-            key, value: (key heads, 1, stored tokens, head size).
             rows: layout of the queries.
-            columns: layout of the stored tokens.
+            columns: layout of the stored tokens, with all first ones before others.
             seen: which of them each query may see by the model's own rule, (queries, stored).
-            scale: factor of dot products.
         """
         near = self._near(rows, columns) & seen
         n_sinks = self.n_sinks(columns)
         far = seen[:, :n_sinks] & ~near[:, :n_sinks]
         if self.positions == "absolute" or not bool(far.any()):
             near[:, :n_sinks] |= far
-            return attend(query, Keys(key, value, near), scale)
-        turned, sinks = self._turn(
-            self.rotations[layer], query, key[..., :n_sinks, :], rows, columns, near
-        )
-        others = Keys(sinks, value[..., :n_sinks, :], far)
-        return attend_to_both(query, Keys(key, value, near), turned, others, scale)
+            return partial(_attend, near)
+        begins = columns.position[near.int().argmax(dim=-1)]  # of each query's window
+        if self.positions == "ceiling":
+            query_moves = self.shape.window - rows.position
+            sink_moves = -columns.position[:n_sinks]
+        else:
+            query_moves = -(begins - columns.behind[n_sinks - 1]).clamp(min=0)
+            sink_moves = torch.zeros_like(columns.position[:n_sinks])
 
-    def attend_in_order(
-        self,
-        layer: int,
-        query: Tensor,
-        key: Tensor,
-        value: Tensor,
-        *,
-        columns: Layout,
-        seen: SeenBy,
-        scale: float | None,
-    ) -> Tensor:
-        """Return the attention of queries that are the last of the stored tokens, in order; see
-        `attend`. What none of a block of them sees is not computed."""
-        n = query.shape[-2]
-        rows = columns[len(columns) - n :]
-        n_sinks = self.n_sinks(columns)
-        parts = []
-        for at in range(0, n, _BLOCK):
-            block = rows[at : at + _BLOCK]
-            oldest = min(int(block.number[0]) - self.shape.window + 1, int(block.first[0]))
-            begin = max(int(torch.searchsorted(columns.first, oldest)), n_sinks)
-            end = len(columns) - n + at + len(block)
-            places = _joined(n_sinks, begin, end, query.device)
-            parts.append(
-                self.attend(
-                    layer,
-                    query[..., at : at + _BLOCK, :],
-                    key[..., places, :],
-                    value[..., places, :],
-                    rows=block,
-                    columns=columns[places],
-                    seen=seen(block.number, columns.number[places]),
-                    scale=scale,
-                )
-            )
-        return torch.cat(parts, dim=-2)
+        def attend_turned(
+            layer: int, query: Tensor, key: Tensor, value: Tensor, scale: float | None
+        ) -> Tensor:
+            rotation = self.rotations[layer]
+            sinks = rotation.turn(key[..., :n_sinks, :], sink_moves)
+            others = Keys(sinks, value[..., :n_sinks, :], far)
+            turned = rotation.turn(query, query_moves)
+            return attend_to_both(query, Keys(key, value, near), turned, others, scale)
+
+        return attend_turned
 
     def _near(self, rows: Layout, columns: Layout) -> Tensor:
         distance = rows.number[:, None] - columns.first
@@ -129,23 +119,11 @@ class WindowAttention:
     def _is_no_sink(self, layout: Layout) -> Tensor:
         return layout.last >= self.shape.sinks
 
-    def _turn(
-        self,
-        rotation: Rotation,
-        query: Tensor,
-        sinks: Tensor,
-        rows: Layout,
-        columns: Layout,
-        near: Tensor,
-    ) -> tuple[Tensor, Tensor]:
-        """Return queries and first keys so that their distance is what it is to seem."""
-        n_sinks = sinks.shape[-2]
-        if self.positions == "ceiling":
-            unturned = rotation.turn(sinks, -columns.position[:n_sinks])
-            return rotation.turn(query, self.shape.window - rows.position), unturned
-        begins = columns.position[near.int().argmax(dim=-1)]  # of each query's window
-        gap = (begins - columns.behind[n_sinks - 1]).clamp(min=0)
-        return rotation.turn(query, -gap), sinks
+
+def _attend(
+    seen: Tensor, _layer: int, query: Tensor, key: Tensor, value: Tensor, scale: float | None
+) -> Tensor:
+    return attend(query, Keys(key, value, seen), scale)
 
 
 def _joined(n_first: int, begin: int, end: int, device: torch.device) -> slice | Tensor:

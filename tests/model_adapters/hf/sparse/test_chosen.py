@@ -113,9 +113,7 @@ def test_it_is_dense_attention_under_the_mask_that_loops_choose(shape, widths, n
     of = of if by_frames else list(range(n_keys))
     pieces = [0 if width == 1 else _Frame(width) for width in widths]
     layout = Layout.of(pieces, 0, torch.arange(n_keys)[None], by_frames=by_frames)
-    output = ChosenAttention(shape).attend_in_order(
-        0, query, key, value, columns=layout, seen=_causal, scale=None
-    )
+    output = ChosenAttention(shape).plan(layout, n, _causal)(0, query, key, value, None)
     for group in range(2):
         for within in range(SHARED):
             states = query[group, within], key[group, 0]

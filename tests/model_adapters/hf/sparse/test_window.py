@@ -91,14 +91,12 @@ def test_it_is_dense_attention_under_the_same_mask(
         layout += Layout.of(pieces, start, numbers[None, start:stop], by_frames=by_frames)
         turned = rotate(key[:, start:stop], numbers[start:stop])
         stored = torch.cat((stored, torch.stack((turned, value[:, start:stop]))), dim=2)
-        output = attention.attend_in_order(
+        output = attention.plan(layout, stop - start, _causal)(
             0,
             rotate(query[:, start:stop], numbers[start:stop]).unflatten(0, (HEADS, SHARED)),
             stored[0][:, None],
             stored[1][:, None],
-            columns=layout,
-            seen=_causal,
-            scale=None,
+            None,
         )
         rows.append(output.flatten(0, 1))
         begin = end
@@ -138,14 +136,13 @@ def test_distances_are_those_of_the_published_code(positions, window, published)
     n = max(published) + 1
     states = torch.randn(3, 1, n, 8, generator=torch.Generator().manual_seed(0))
     numbers = torch.arange(n)
-    output = WindowAttention(Window(2, window), positions, [TURN]).attend_in_order(
+    layout = Layout.of([0] * n, 0, numbers[None], by_frames=False)
+    output = WindowAttention(Window(2, window), positions, [TURN]).plan(layout, n, _causal)(
         0,
         rotate(states[0], numbers)[None],
         rotate(states[1], numbers)[None],
         states[2][None],
-        columns=Layout.of([0] * n, 0, numbers[None], by_frames=False),
-        seen=_causal,
-        scale=None,
+        None,
     )
     for row, distances in published.items():
         # Other queries see themselves.
