@@ -1,6 +1,6 @@
 """What sparse attention costs by the length of a context: seconds of attention, and the cache.
 
-    python -m benchmarks.sparse_attention [--tokens 8000,32000] [--attention all,sinks:64+window:4096]
+    python -m benchmarks.sparse_attention [--tokens 8000,32000] [--attention all,window:4096]
 
 A language model with random weights, four layers of 16 heads of 64 (4 of keys), reads random words
 by the harness's own encoding, in chunks of 1,024. `all` is dense attention by torch's kernel. Times
@@ -66,7 +66,7 @@ def save_model(folder: Path) -> None:
 
 def measure(folder: Path, attention: str, n_tokens: int) -> tuple[float, int]:
     """Return the seconds of attention of reading so many tokens, and the bytes of the cache."""
-    options = {"pretrained": str(folder), "prompt": "plain", "device": "cpu", "chunk_tokens": "1024"}
+    options = {"pretrained": str(folder), "prompt": "plain", "device": "cpu"}
     if attention != DENSE:
         options["attention"] = attention
     model: Any = load("hf-lm", options, 0)
@@ -83,7 +83,7 @@ def measure(folder: Path, attention: str, n_tokens: int) -> tuple[float, int]:
         ALL_ATTENTION_FUNCTIONS["sdpa"] = dense
         SparseReading._attention = sparse  # type: ignore[method-assign]
     layers = [it for it in model._prefix.cache.layers if isinstance(it, BufferedLayer)]
-    n_bytes = sum(buffer.nbytes for layer in layers for buffer in layer._buffers or ())
+    n_bytes = sum(layer.n_bytes for layer in layers)
     model.close()
     return clock.seconds, n_bytes
 

@@ -34,6 +34,27 @@ class Turn:
 
 
 @dataclass(frozen=True, kw_only=True)
+class CacheCut:
+    """What is kept of keys and values of the frames before the last one, when these are encoded.
+
+    Attributes:
+        method: class that chooses or makes what is kept, MODULE:CLASS (`hf.kept.methods`).
+        budget: most tokens that are kept of these frames; None for all.
+        frames: numbers of the frames, in the conversation, that are kept; None if the method
+            chooses tokens.
+        clues: numbers of those with evidence, of which the reply says how much was kept; no method
+            is told them.
+        seed: seed of what the method draws.
+    """
+
+    method: str
+    budget: int | None = None
+    frames: tuple[int, ...] | None = None
+    clues: tuple[int, ...] = ()
+    seed: int = 0
+
+
+@dataclass(frozen=True, kw_only=True)
 class Decoding:
     """Settings of decoding a reply.
 
@@ -48,6 +69,7 @@ class Decoding:
             cuts it.
         repetition_penalty: penalty of tokens in context and reply, as in transformers, 1 for none;
             None for the checkpoint's own (1.05 in Qwen2.5-VL).
+        cache: what the model keeps of frames in its cache; None for everything.
     """
 
     max_new_tokens: int
@@ -57,6 +79,7 @@ class Decoding:
     stop: tuple[str, ...] = ()
     choices: tuple[str, ...] = ()
     repetition_penalty: float | None = None
+    cache: CacheCut | None = None
 
     def __post_init__(self) -> None:
         """Check the ranges of all values; raise `UsageError` for one that is out of its range."""
@@ -89,6 +112,22 @@ class Decoding:
 
 
 @dataclass(frozen=True)
+class KeptCache:
+    """What was kept of the cache of the frames before the last one.
+
+    Attributes:
+        tokens: tokens of a head, on average.
+        bytes: bytes of all layers.
+        clues: share of the clue frames' tokens that was kept, the mean of all heads; None if there
+            are none.
+    """
+
+    tokens: float
+    bytes: int
+    clues: float | None
+
+
+@dataclass(frozen=True)
 class Reply:
     """A model's reply.
 
@@ -115,6 +154,7 @@ class Reply:
             reply and the one that ends it, in nats; None unless the model was asked to say so.
         seconds: seconds that the reply took, where that is not the duration of the request: a
             person's, while the question was on the screen.
+        kept: what was kept of the cache, if the decoding cuts it.
     """
 
     text: str
@@ -130,6 +170,7 @@ class Reply:
     frames_hash: str | None = None
     margins: tuple[float, ...] | None = None
     seconds: float | None = None
+    kept: KeptCache | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -146,6 +187,7 @@ class Capabilities:
             a video is refused.
         video_input: conversations take videos; if false, a video is refused, and its frames can be
             given as images.
+        cache_cuts: replies can be decoded behind a cut cache (`Decoding.cache`).
         batch_size: continuations of a conversation that the model answers together.
         batch_contexts: continuations that have no frames in common are worth answering together,
             too.
@@ -163,6 +205,7 @@ class Capabilities:
     choices: bool = False
     image_input: bool = True
     video_input: bool = False
+    cache_cuts: bool = False
     batch_size: int = 1
     batch_contexts: bool = False
     max_in_flight: int = 1

@@ -17,7 +17,8 @@ def check_decoding(name: str, capabilities: Capabilities, decoding: Decoding) ->
     """Check that the model of this name supports this way of decoding.
 
     Raises:
-        ModelError: the model does not sample, or cannot be restricted to choices.
+        ModelError: the model does not sample, cannot be restricted to choices, or has no cache that
+            can be cut.
     """
     if not (decoding.greedy or capabilities.sampling):
         raise ModelError(
@@ -27,6 +28,11 @@ def check_decoding(name: str, capabilities: Capabilities, decoding: Decoding) ->
     if decoding.choices and not capabilities.choices:
         raise ModelError(
             f"{name} does not support choices ({len(decoding.choices)} given); ask without choices"
+        )
+    if decoding.cache is not None and not capabilities.cache_cuts:
+        raise ModelError(
+            f"{name} has no cache that a memory can cut; use a memory of frames, or a model of "
+            "transformers with share_prefix=true"
         )
 
 

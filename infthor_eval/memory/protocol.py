@@ -28,11 +28,15 @@ class MemoryCapabilities:
             question's clues.
         writes: it asks the model under test for texts (`TrajectoryFacts.write`).
         deterministic: the same observations and query recall the same.
+        cache: what cuts the model's cache, MODULE:CLASS; None if what is recalled is shown. All
+            frames are encoded, and of their keys and values those of the recalled ones are kept, or
+            what that class chooses within the budget (`infthor_eval.memory.caches`).
     """
 
     privileged: bool = False
     writes: bool = False
     deterministic: bool = True
+    cache: str | None = None
 
 
 # Asks the model under test: given texts and frames in order and the limit of the reply in tokens,

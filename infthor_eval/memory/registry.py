@@ -37,6 +37,7 @@ from model_adapters.own_function import OwnFunction, read_function
 _FRAMES = "infthor_eval.memory.frames"
 _RETRIEVAL = "infthor_eval.memory.retrieval"
 _TEXTS = "infthor_eval.memory.texts"
+_CACHES = "infthor_eval.memory.caches"
 MEMORIES = PluginTable(
     "memory",
     "infthor_eval.memories",
@@ -50,6 +51,15 @@ MEMORIES = PluginTable(
         "text-log": f"{_TEXTS}:TextLog",
         "oracle": f"{_FRAMES}:Oracle",
         "random": f"{_FRAMES}:Random",
+        "kv-window": f"{_CACHES}:KvWindow",
+        "kv-sinks": f"{_CACHES}:KvSinks",
+        "kv-uniform": f"{_CACHES}:KvUniform",
+        "kv-random": f"{_CACHES}:KvRandom",
+        "kv-oracle": f"{_CACHES}:KvOracle",
+        "kv-question": f"{_CACHES}:KvQuestion",
+        "kv-norm": f"{_CACHES}:KvNorm",
+        "kv-merge": f"{_CACHES}:KvMerge",
+        "kv-8bit": f"{_CACHES}:KvEightBits",
     },
     "docs/memories.md",
 )

@@ -1,6 +1,7 @@
 """NIEH set up for a run: the questions of its tasks, answered a trajectory at a time."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from itertools import groupby
 
@@ -29,7 +30,7 @@ from infthor_eval.runs import (
     Workload,
 )
 from infthor_eval.settings import config_values, settings_of
-from model_adapters import Model, Subject, check_decoding
+from model_adapters import CacheCut, Model, Subject, check_decoding
 
 # What the tasks of a run lack where an option has no effect, by `Setting.where`, and what has it.
 _WITHOUT_EFFECT = {
@@ -88,6 +89,11 @@ class NiehEvaluation:
             independent=not any(asks_model(ready.task_samples) for ready in prepared.values()),
         )
         return BoundNieh(workload, prepared, answerer)
+
+    @property
+    def reuses_encodings(self) -> bool:
+        """See `infthor_eval.runs.Evaluation`: memories of the cache are cut from one encoding."""
+        return any(task.cuts_cache for task in self._tasks)
 
     def to_doc(self, header: RunHeader[NiehConfig], record: UnitRecord[NiehAnswer]) -> UnitDoc:
         """See `infthor_eval.runs.Evaluation.to_doc`."""
@@ -251,6 +257,8 @@ def _refuse_incapable(subject: Subject, options: NiehOptions, tasks: Iterable[Ni
             )
     for task in tasks:
         check_decoding(f"{task.name}: {subject.name}", subject.capabilities, task.decoding)
+        cut = CacheCut(method="") if task.cuts_cache else None
+        check_decoding(subject.name, subject.capabilities, replace(task.decoding, cache=cut))
 
 
 def _refuse_empty(task_samples: Sequence[TaskSamples | None], tasks: Sequence[NiehTask]) -> None:

@@ -10,6 +10,7 @@ from infthor_eval.formats.question_forms import type_of
 from infthor_eval.nieh.config import NiehConfig
 from infthor_eval.quantities import Amount, Count, Number, Share, Whole
 from infthor_eval.runs.journals.records import RecordTypes, Typed
+from model_adapters import KeptCache
 
 _Answers = tuple[str | Whole | Number, ...]
 
@@ -106,6 +107,19 @@ class NiehRecall(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", ta
         return sum(isinstance(position, int) for position in self.recalled)
 
 
+class KeptTokens(msgspec.Struct, frozen=True, kw_only=True):
+    """What was kept of the model's cache; see `KeptCache`."""
+
+    tokens: Amount
+    bytes: Count
+    clues: Amount | None = None
+
+    @classmethod
+    def of(cls, kept: KeptCache) -> "KeptTokens":
+        """Return what a model said of its cache."""
+        return cls(tokens=kept.tokens, bytes=kept.bytes, clues=kept.clues)
+
+
 class NiehAnswer(Typed, frozen=True, kw_only=True, tag="nieh_answer"):
     """A question and the reply to it.
 
@@ -131,6 +145,7 @@ class NiehAnswer(Typed, frozen=True, kw_only=True, tag="nieh_answer"):
         reply_ids: ids of the reply's tokens; empty unless the model was asked for margins.
         margins: how much likelier the likeliest token was than the second, at each of these and at
             the one that ends the reply, in nats; empty likewise.
+        kept: what was kept of the model's cache; None if it was not cut.
     """
 
     question: str
@@ -150,6 +165,7 @@ class NiehAnswer(Typed, frozen=True, kw_only=True, tag="nieh_answer"):
     n_watched: Count | None = None
     reply_ids: tuple[Count, ...] = ()
     margins: tuple[Amount, ...] = ()
+    kept: KeptTokens | None = None
 
     @classmethod
     def of(

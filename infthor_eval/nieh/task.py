@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 from infthor_eval.errors import DataError, UsageError, unknown_name
 from infthor_eval.formats.nieh_set import NiehSet
-from infthor_eval.memory import parse_options, read_budget
+from infthor_eval.memory import memory_class, parse_options, read_budget
 from infthor_eval.nieh.config import MetricsConfig, NiehTaskConfig, SkippedSample
 from infthor_eval.nieh.contexts import (
     CONTEXTS,
@@ -100,6 +100,15 @@ class NiehTask:
             return self.task_samples.sources
         settings = read(ContextSettings, self._config)
         return CONTEXTS[self._config["context"]].sources(self.data, settings)
+
+    @cached_property
+    def cuts_cache(self) -> bool:
+        """True if its memory is one of the model's cache."""
+        name = self._config.get("memory")
+        if self._config["context"] != MEMORY or name is None:
+            return False
+        capabilities = getattr(memory_class(name), "capabilities", None)
+        return getattr(capabilities, "cache", None) is not None
 
     def takes(self, where: str) -> bool:
         """Return whether options that apply there (`Setting.where`) have an effect on it."""

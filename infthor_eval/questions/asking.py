@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import groupby
 from typing import Any, Generic, Protocol, TypeVar
 
 from infthor_eval.errors import (
@@ -309,7 +310,9 @@ def _batches(
     """Yield batches of requests with one decoding: all first requests, then all second ones."""
     for repeat in sorted({request.unit.key.repeat for request in requests}):
         same = [request for request in requests if request.unit.key.repeat == repeat]
-        yield from (same[at : at + size] for at in range(0, len(same), size))
+        for _, group in groupby(same, key=lambda request: request.decoding):
+            alike = list(group)
+            yield from (alike[at : at + size] for at in range(0, len(alike), size))
 
 
 def _find_record(

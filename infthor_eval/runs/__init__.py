@@ -31,7 +31,7 @@ from infthor_eval.runs.suite import (
     keep_request,
 )
 from infthor_eval.runs.usage import NOTHING, Usage
-from infthor_eval.runs.work.binding import check_runs
+from infthor_eval.runs.work.binding import SharedSubject, check_runs
 from infthor_eval.runs.work.driver import Observer, RunOutcome, Silent, execute
 from infthor_eval.runs.work.equality import Equality, check_equality, require_switches
 from infthor_eval.runs.work.estimate import Estimate, TaskEstimate, estimate_run
@@ -55,6 +55,7 @@ __all__ = [
     "RunRequest",
     "RunSummary",
     "Session",
+    "SharedSubject",
     "Silent",
     "Skipped",
     "StoredCommand",

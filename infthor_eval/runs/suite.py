@@ -201,7 +201,11 @@ class BoundEvaluation(Protocol[SuiteUnit, Payload]):
 
 
 class Evaluation(Protocol[SuiteUnit, Payload]):
-    """A suite set up for a run. It holds only what files hold, and may be bound more than once."""
+    """A suite set up for a run. It holds only what files hold, and may be bound more than once.
+
+    One may have `reuses_encodings`, which is true if runs of one model that follow each other ask
+    behind what it has encoded before; then they share the loaded model.
+    """
 
     def bind(self, subject: Subject) -> BoundEvaluation[SuiteUnit, Payload]:
         """Find all the work for a subject.

@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, ClassVar
 
 import torch
 
@@ -69,7 +69,13 @@ class CheckpointModel(ABC):
 
 
 class HfModel(CheckpointModel):
-    """A model whose weights transformers runs in this process."""
+    """A model whose weights transformers runs in this process.
+
+    Attributes:
+        cuts_caches: True if it answers behind a cache that was cut.
+    """
+
+    cuts_caches: ClassVar[bool] = False
 
     def __init__(self, name: str, loaded: LoadedCheckpoint, options: HfOptions) -> None:
         super().__init__(name, loaded, options.threads)
@@ -85,6 +91,7 @@ class HfModel(CheckpointModel):
             choices=True,
             image_input=self._prompter.takes_frames,
             video_input=self._prompter.takes_videos,
+            cache_cuts=self.cuts_caches,
             batch_size=self._batch_size,
             max_tokens=self._context_limit,
             max_tokens_before_extension=None

@@ -243,6 +243,13 @@ class HfOptions(Reading, Placement):
     feature_cache_mb: Annotated[
         Count, Setting(help="Memory for vision features of earlier frames, in MiB.")
     ] = 128
+    encoded_mb: Annotated[
+        Count,
+        Setting(
+            help="Memory for keys and values of trajectories that memories of the cache are cut "
+            "from, in MiB."
+        ),
+    ] = 4096
     frame_threads: Annotated[
         Annotated[int, Meta(ge=0, le=1024)] | None,
         Setting(

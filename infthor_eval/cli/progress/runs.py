@@ -10,8 +10,17 @@ from infthor_eval.cli.progress.bar import PacedBar
 from infthor_eval.cli.progress.notes import NOTES, print_note, prints_as_notes
 from infthor_eval.cli.progress.stopping import Stop, stop_on_sigint
 from infthor_eval.reasons import count_reasons
-from infthor_eval.runs import PreparedRun, RunOutcome, UnitRecord, Workload, check_runs, execute
+from infthor_eval.runs import (
+    PreparedRun,
+    RunOutcome,
+    SharedSubject,
+    UnitRecord,
+    Workload,
+    check_runs,
+    execute,
+)
 from infthor_eval.terminal import progress_bar
+from model_adapters import Subject
 
 
 class _ProgressObserver:
@@ -85,26 +94,27 @@ def execute_runs(
     """
     check_others(runs)
     outcomes: list[RunOutcome] = []
-    for run in runs:
-        outcome, is_requested = _execute(run)
-        outcomes.append(outcome)
-        finish(outcome)
-        if outcome.n_missing:
-            return outcomes, True
-        left = len(runs) - len(outcomes)
-        if is_requested and left:
-            print_note(
-                f"stopped, {left} run(s) not begun; run the same command to continue", "yellow"
-            )
-            return outcomes, True
+    with SharedSubject() as shared:
+        for run in runs:
+            outcome, is_requested = _execute(run, shared.of(run))
+            outcomes.append(outcome)
+            finish(outcome)
+            if outcome.n_missing:
+                return outcomes, True
+            left = len(runs) - len(outcomes)
+            if is_requested and left:
+                print_note(
+                    f"stopped, {left} run(s) not begun; run the same command to continue", "yellow"
+                )
+                return outcomes, True
     return outcomes, False
 
 
-def _execute(run: PreparedRun) -> tuple[RunOutcome, bool]:
-    """Execute a run; return whether Ctrl-C was pressed, too."""
+def _execute(run: PreparedRun, loaded: Subject | None) -> tuple[RunOutcome, bool]:
+    """Execute a run, whose subject may be loaded; return whether Ctrl-C was pressed, too."""
     with progress_bar(NOTES) as progress, stop_on_sigint(print_note) as stop, prints_as_notes():
         observer = _ProgressObserver(run.request.label, progress, stop)
-        outcome = execute(run, observer, stop)
+        outcome = execute(run, observer, stop, loaded)
     pace = observer.bar.pace
     print_note(
         f"{run.request.label}: {pace.n_new} evaluated now, {pace.n_resumed} resumed from the "

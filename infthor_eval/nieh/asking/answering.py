@@ -19,7 +19,7 @@ from infthor_eval.nieh.asking.budget import budget_of
 from infthor_eval.nieh.asking.notebook import Notebook
 from infthor_eval.nieh.asking.recalling import Recaller, apply_recall
 from infthor_eval.nieh.contexts.video import as_images
-from infthor_eval.nieh.records import NiehAnswer, NiehRecall
+from infthor_eval.nieh.records import KeptTokens, NiehAnswer, NiehRecall
 from infthor_eval.nieh.samples import TaskSamples
 from infthor_eval.nieh.task import PreparedTask
 from infthor_eval.nieh.twins import first_world, twin_side
@@ -59,7 +59,9 @@ class NiehRequest(Request[NiehAnswer]):
             context=tuple(as_images(context) if video_input is False else context),
             text=text,
             answers=unit.payload.answers,
-            decoding=replace(decoding, seed=decoding.seed + unit.key.repeat - 1),
+            decoding=replace(
+                decoding, seed=decoding.seed + unit.key.repeat - 1, cache=unit.sample.cut
+            ),
             stop=prepared.stop,
         )
 
@@ -79,7 +81,8 @@ class NiehRequest(Request[NiehAnswer]):
     def replied(self, reply: Reply, answer: str, thinking: str | None) -> NiehAnswer:
         """See `Request`."""
         payload = self.unit.payload.with_reply(answer, {}, thinking)
-        payload = replace_fields(payload, n_watched=reply.n_watched)
+        kept = None if reply.kept is None else KeptTokens.of(reply.kept)
+        payload = replace_fields(payload, n_watched=reply.n_watched, kept=kept)
         if reply.margins is None:
             return payload
         margins = tuple(round(margin, _MARGIN_DIGITS) for margin in reply.margins)
@@ -304,11 +307,18 @@ def _recall(unit: NiehUnit, recaller: Recaller, prepared: PreparedTask) -> NiehU
         recall = recaller.recall(unit.sample)
     except (DataError, ModelError, UserCodeError) as error:
         return error
-    sample = apply_recall(unit.sample, recall)
+    samples = prepared.task_samples
+    question = unit.sample.question
+    clues = samples.data.clue_positions(question) if question.has_evidence else ()
+    sample = apply_recall(unit.sample, recall, tuple(sorted(set(clues))))
+    seen = sample
+    if sample.cut is not None:  # of a cache what is left of the frames
+        seen = replace(sample, frames=(*(sample.cut.frames or ()), sample.frames[-1]))
+    chooses_tokens = sample.cut is not None and sample.cut.frames is None
     payload = replace_fields(
         unit.payload,
         recall=recall,
-        shown_clues=shown_clues(prepared.task_samples, sample),
-        twin=twin_side(prepared.task_samples, sample),
+        shown_clues=None if chooses_tokens else shown_clues(samples, seen),
+        twin=twin_side(samples, seen),
     )
     return replace(unit, sample=sample, payload=payload)

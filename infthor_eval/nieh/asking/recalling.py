@@ -28,12 +28,14 @@ from infthor_eval.memory import (
     pieces_of,
     wrap_memory_errors,
 )
+from infthor_eval.memory.caches import FRAMES
 from infthor_eval.nieh.contexts import QuestionVariant
 from infthor_eval.nieh.contexts.base import RecallSettings
 from infthor_eval.nieh.records import NiehRecall
 from infthor_eval.nieh.samples import TaskSamples
 from infthor_eval.storage.deadlines import not_counted
 from infthor_eval.storage.digests import fingerprint
+from model_adapters import CacheCut
 
 # Looks up what was recalled from the same inputs, by their hash.
 FindRecall = Callable[[str], NiehRecall | None]
@@ -219,9 +221,23 @@ def _uncounted(write: Write) -> Write:
     return ask
 
 
-def apply_recall(sample: QuestionVariant, recall: NiehRecall) -> QuestionVariant:
-    """Return a sample with what was recalled for it: these frames and the last one are shown."""
+def apply_recall(
+    sample: QuestionVariant, recall: NiehRecall, clues: tuple[int, ...] = ()
+) -> QuestionVariant:
+    """Return a sample with what was recalled for it: these frames and the last one are shown, or
+    kept in the model's cache, which reads all."""
     frames = [number for number in recall.recalled if isinstance(number, int)]
+    settings = sample.recall
+    cache = open_memory(settings.memory, settings.options).capabilities.cache if settings else None
+    if settings is not None and cache is not None:
+        cut = CacheCut(
+            method=cache,
+            budget=settings.budget,
+            frames=tuple(frames) if cache == FRAMES else None,
+            clues=clues,
+            seed=settings.seed,
+        )
+        return replace(sample, recalled=recall.recalled, cut=cut)
     return replace(sample, frames=(*frames, sample.frames[-1]), recalled=recall.recalled)
 
 
@@ -236,6 +252,9 @@ def recall_all(task_samples: TaskSamples) -> list[QuestionVariant]:
     )
     with recaller.in_use():
         try:
+            for settings in {sample.recall for _, sample in by_trajectory if sample.recall}:
+                if open_memory(settings.memory, settings.options).capabilities.cache:
+                    raise UsageError(f"the memory {settings.memory} cuts the model's own cache")
             recalled = {
                 number: apply_recall(sample, recaller.recall(sample))
                 for number, sample in by_trajectory

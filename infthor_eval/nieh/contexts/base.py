@@ -17,6 +17,7 @@ from infthor_eval.nieh.prompts import PUBLISHED_MAIN, question_text
 from infthor_eval.quantities import Share, Total
 from infthor_eval.settings import Setting
 from infthor_eval.storage.digests import digest, fingerprint
+from model_adapters import CacheCut
 
 ContextPart = str | FrameRef | Video
 VIEW_FOLLOWS = "; Last agent's view: "  # text before a frame, which goes with it
@@ -58,6 +59,8 @@ class QuestionVariant:
         recall: how frames and texts are recalled; None if the context shows what it says.
         recalled: what was recalled, positions of frames and texts in order; None before. `frames`
             are all frames before, and then the recalled ones and the last.
+        cut: what is kept of the model's cache of all frames, if the memory is one of the cache;
+            `frames` are all frames then.
         fps: rate at which the frames are sampled from a film, per second, if they are shown as a
             video.
     """
@@ -68,6 +71,7 @@ class QuestionVariant:
     n_cut: int = 0
     recall: RecallSettings | None = None
     recalled: tuple[int | str, ...] | None = None
+    cut: CacheCut | None = None
     fps: float | None = None
 
     @property

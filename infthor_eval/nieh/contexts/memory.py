@@ -11,7 +11,8 @@ from infthor_eval.errors import UsageError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question, SkippedQuestion
-from infthor_eval.memory import accepted_options, memory_identity
+from infthor_eval.memory import accepted_options, memory_identity, open_memory
+from infthor_eval.memory.caches import FRAMES
 from infthor_eval.nieh.contexts.base import (
     ContextPart,
     ContextSettings,
@@ -38,6 +39,12 @@ def memory(
 def memory_sources(_data: NiehSet, settings: ContextSettings) -> dict[str, Any]:
     """Return the identity of the memory: another one recalls other things."""
     recall = _recall(settings)
+    cache = open_memory(recall.memory, recall.options).capabilities.cache
+    least = recall.tokens_per_frame or 0
+    if cache == FRAMES and recall.budget is not None and recall.budget < least:
+        raise UsageError(
+            f"--budget {recall.budget}: less than a frame, which has {least} tokens; give more"
+        )
     return memory_identity(recall.memory, recall.options)
 
 
@@ -47,6 +54,8 @@ def recalled_parts(
     """Return what was recalled in order (a mark before it is), then the last frame."""
     if sample.recalled is None:
         return [_UNRECALLED, *frames[-1:]]
+    if sample.cut is not None:
+        return list(frames)
     left = iter(frames)
     return [*(part if isinstance(part, str) else next(left) for part in sample.recalled), *left]
 

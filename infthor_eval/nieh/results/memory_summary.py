@@ -16,6 +16,27 @@ _OF_MEMORY = re.compile(r"(?:, )?\b(?:memory|memory_args|budget)=[^,)]*")
 Record = UnitRecord[NiehAnswer]
 
 
+class KeptMeans(msgspec.Struct, frozen=True):
+    """Tokens and bytes that were kept of a model's cache, and the share of the clues' tokens."""
+
+    tokens: float
+    bytes: float
+    clues: float | None
+
+    @classmethod
+    def of(cls, records: "Sequence[Record]") -> "KeptMeans | None":
+        """Return the means; None if no cache was cut."""
+        kept = [record.payload.kept for record in records if record.payload.kept is not None]
+        if not kept:
+            return None
+        clues = [each.clues for each in kept if each.clues is not None]
+        return cls(
+            fmean(each.tokens for each in kept),
+            fmean(each.bytes for each in kept),
+            fmean(clues) if clues else None,
+        )
+
+
 class MemorySummary(msgspec.Struct, frozen=True):
     """A task's memory, and what it recalled for a question on average.
 
@@ -26,6 +47,7 @@ class MemorySummary(msgspec.Struct, frozen=True):
         n_frames: recalled frames of a question.
         n_tokens: tokens of a question with all that is shown, as the model counts them; None if it
             does not.
+        kept: what was kept of the model's cache on average; None of other memories.
     """
 
     name: str
@@ -33,6 +55,7 @@ class MemorySummary(msgspec.Struct, frozen=True):
     budget: int | None
     n_frames: float
     n_tokens: float | None
+    kept: KeptMeans | None = None
 
 
 class MemoryTimes(msgspec.Struct, frozen=True):
@@ -62,6 +85,7 @@ def summarise_memory(
         budget=read_budget(config.budget) if task.budget is None else task.budget,
         n_frames=fmean(recall.n_frames for recall in recalls),
         n_tokens=fmean(tokens) if tokens else None,
+        kept=KeptMeans.of(records),
     )
 
 

@@ -10,7 +10,7 @@ from infthor_eval.nieh.config import NiehConfig
 from infthor_eval.nieh.results.cells import mean_cell, score_interval
 from infthor_eval.nieh.results.facets import SHOWN_CLUES
 from infthor_eval.nieh.results.gains import Gain, difference_cell, gain_cell, paired_gain
-from infthor_eval.nieh.results.memory_summary import subject_of
+from infthor_eval.nieh.results.memory_summary import KeptMeans, subject_of
 from infthor_eval.nieh.results.summary import NiehSummary, TaskSummary, main_metric
 from infthor_eval.runs import RunSummary
 from infthor_eval.tables import Column, Row, Table, TableCell
@@ -28,6 +28,12 @@ _NUMBERS = (
     "build s",
     "recall s",
 )
+_KEPT_NOTE = (
+    "kept, MB: tokens and bytes that are left of the model's cache of the frames before the "
+    "current view; clues kept: % of the clue frames' tokens among them, the mean of layers and "
+    "heads."
+)
+_KEPT = ("kept", "MB", "clues kept")
 _NONE = "none"  # the memory that recalls nothing
 _ABOVE_NONE = "above none"
 _ABOVE_BLIND = "above blind"
@@ -70,8 +76,11 @@ def memory_tables(runs: Sequence[RunSummary]) -> list[Table]:
     further = [column for column, is_wanted in wanted.items() if is_wanted]
     keyed = sorted(((_place(*it), _row(*it, runs, further)) for it in found), key=itemgetter(0))
     names = (*_NUMBERS[:_FIRST], *further, *_NUMBERS[_FIRST:])
+    has_kept = any(run.summary.tasks[name].memory.kept is not None for run, name in found)
+    names = (*names, *(_KEPT if has_kept else ()))
     columns = (*(Column(name, False) for name in _NAMES), *map(Column, names))
     notes = (*_NOTES, *((_ABOVE_NONE_NOTE,) if _ABOVE_NONE in further else ()))
+    notes = (*notes, *((_KEPT_NOTE,) if has_kept else ()))
     return [Table("Memories", columns, tuple(row for _, row in keyed), notes)] if found else []
 
 
@@ -167,7 +176,13 @@ def _cells(
         "-" if memory.n_tokens is None else f"{memory.n_tokens:,.0f}",
         "-" if times is None else f"{times.build_s:.3f}",
         "-" if times is None else f"{times.recall_s:.3f}",
+        *(() if memory.kept is None else _kept_cells(memory.kept)),
     )
+
+
+def _kept_cells(kept: KeptMeans) -> tuple[str, ...]:
+    clues = "-" if kept.clues is None else f"{100 * kept.clues:.1f}"
+    return f"{kept.tokens:,.0f}", f"{kept.bytes / 1e6:.2f}", clues
 
 
 def _recalled(task: TaskSummary, share: str, metric: str) -> TableCell:

@@ -56,6 +56,10 @@ class RecalledHistory:
                 f"the memory {name} needs a model that writes for it, as agents do not; take "
                 "another"
             )
+        if self._memory.capabilities.cache:
+            raise UsageError(
+                f"the memory {name} cuts the model's cache, for questions alone; take one of frames"
+            )
         self.identity()  # opens what the memory needs now, rather than at the first plan
         self._observed: list[Observation] = []
         self._in_use = threading.Lock()  # episodes in flight share it

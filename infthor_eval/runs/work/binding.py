@@ -82,6 +82,39 @@ def check_runs(runs: Iterable[PreparedRun[Any, Any]]) -> None:
                 _close_quietly(bind_run(run, bound.subject))
 
 
+class SharedSubject:
+    """The subject of runs that follow each other and reuse what it has encoded (a context
+    manager)."""
+
+    def __init__(self) -> None:
+        self._key: tuple[Any, ...] | None = None
+        self._subject: Subject | None = None
+
+    def __enter__(self) -> "SharedSubject":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._close()
+
+    def of(self, run: PreparedRun[Any, Any]) -> Subject | None:
+        """Return the loaded subject of a run, the same one as before where it can be; None for a
+        run that loads its own."""
+        key = _subject_of(run)
+        reuses = getattr(run.evaluation, "reuses_encodings", False)
+        if not reuses or not run.request.worker_settings.is_local:
+            self._close()
+        elif key != self._key:
+            self._close()
+            self._subject = _load_subject(run)
+            self._key = key
+        return self._subject
+
+    def _close(self) -> None:
+        if self._subject is not None:
+            self._subject.close()
+        self._key = self._subject = None
+
+
 def _close_quietly(bound: BoundRun[Any, Any]) -> None:
     with suppress(UserCodeError):  # told by the run itself, beside its results
         bound.close()

@@ -17,6 +17,7 @@ from infthor_eval.runs.suite import RunSummary, UnitDoc, Workload
 from infthor_eval.runs.usage import Usage
 from infthor_eval.runs.work.executor import Executor, LocalExecutor
 from infthor_eval.runs.work.worker_executor import WorkerPoolExecutor
+from model_adapters import Subject
 
 
 class Observer(Protocol):
@@ -75,6 +76,7 @@ def execute(
     run: PreparedRun[SuiteUnit, Payload],
     observer: Observer | None = None,
     should_stop: Callable[[], bool] = lambda: False,
+    loaded: Subject | None = None,
 ) -> RunOutcome[SuiteUnit, Payload]:
     """Load the model, do what the journal does not hold yet, and write the results.
 
@@ -87,6 +89,7 @@ def execute(
         observer: follows the run.
         should_stop: called after each unit; once it returns True, the units in hand are finished,
             and the results so far are written.
+        loaded: the subject, if it is loaded; it is not closed.
 
     Raises:
         UsageError: another process at the same run, a subject that the suite cannot evaluate, or
@@ -95,7 +98,7 @@ def execute(
         DataError: the journal has a bad line, or the results cannot be written.
     """
     observer = observer or Silent()
-    executor = _start_executor(run, observer.notify)
+    executor = _start_executor(run, observer.notify, loaded)
     try:
         outcome = _evaluate(run, executor, observer, should_stop)
     except BaseException:
@@ -138,10 +141,10 @@ def _evaluate(
 
 
 def _start_executor(
-    run: PreparedRun[SuiteUnit, Payload], notify: Callable[[str], None]
+    run: PreparedRun[SuiteUnit, Payload], notify: Callable[[str], None], loaded: Subject | None
 ) -> Executor[Payload]:
     if run.request.worker_settings.is_local:
-        return LocalExecutor(run, notify)
+        return LocalExecutor(run, notify, loaded)
     return WorkerPoolExecutor(run, notify)
 
 

@@ -23,7 +23,7 @@ from infthor_eval.runs.suite import Group, Workload
 from infthor_eval.runs.usage import NOTHING, Usage
 from infthor_eval.runs.work.batches import fetch_replies
 from infthor_eval.runs.work.binding import bind_run, group_records
-from model_adapters import BatchModel, PersonModel
+from model_adapters import BatchModel, PersonModel, Subject
 
 
 class Executor(Protocol[Payload]):
@@ -49,10 +49,16 @@ class Executor(Protocol[Payload]):
 class LocalExecutor(Generic[SuiteUnit, Payload]):
     """The executor of this process."""
 
-    def __init__(self, run: PreparedRun[SuiteUnit, Payload], notify: Callable[[str], None]) -> None:
-        """Load the subject and find the work; `notify` is called for each batch."""
+    def __init__(
+        self,
+        run: PreparedRun[SuiteUnit, Payload],
+        notify: Callable[[str], None],
+        loaded: Subject | None = None,
+    ) -> None:
+        """Load the subject, unless it is given, and find the work; `notify` is called for each
+        batch."""
         self._notify = notify
-        self._bound = bind_run(run)
+        self._bound = bind_run(run, loaded)
         self._encoder = RecordEncoder(run.suite.records)
         self.header = self._bound.header
         self.workload = self._bound.evaluation.workload

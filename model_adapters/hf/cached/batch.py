@@ -10,6 +10,7 @@ from model_adapters.hf.cached.branch_attention import BranchAttention
 from model_adapters.hf.cached.decoding import ReplyState, decode_replies
 from model_adapters.hf.cached.kv_cache import cache_arguments
 from model_adapters.hf.cached.prefix import Prefix, chunks
+from model_adapters.hf.kept.cutting import CutPrefix
 from model_adapters.hf.prompting.embedding import Embed, Span
 from model_adapters.hf.prompting.prompt import Piece, token_ids
 
@@ -19,7 +20,9 @@ _Span = tuple[int, Span]  # of a branch
 class _Branches:
     """Continuations of so many pieces of a prefix, each with the positions that it has alone."""
 
-    def __init__(self, model: Any, embed: Embed, prefix: Prefix, n_shared: Sequence[int]) -> None:
+    def __init__(
+        self, model: Any, embed: Embed, prefix: Prefix | CutPrefix, n_shared: Sequence[int]
+    ) -> None:
         self._model = model
         self._embed = embed
         self._prefix = prefix
@@ -106,7 +109,7 @@ def answer_together(
     model: Any,
     embed: Embed,
     *,
-    prefix: Prefix,
+    prefix: Prefix | CutPrefix,
     prompts: Sequence[Sequence[Piece]],
     n_shared: Sequence[int],
     replies: Sequence[ReplyState],

@@ -188,6 +188,11 @@ class BufferedLayer(DynamicLayer):
         self.values = values[..., :new, :]
         return self.keys.to(key_states.device), self.values.to(value_states.device)
 
+    @property
+    def n_bytes(self) -> int:
+        """Bytes of the buffers."""
+        return sum(buffer.nbytes for buffer in self._buffers or ())
+
     def drop(self, begin: int, end: int) -> None:
         """Forget the tokens of these places."""
         assert self._buffers is not None  # there are tokens

@@ -13,6 +13,14 @@ from model_adapters.hf.cached.prefix import Prefix
 from model_adapters.hf.cached.replies import begin_reply, end_reply
 from model_adapters.hf.checkpoint_model import HfModel
 from model_adapters.hf.global_settings import torch_threads
+from model_adapters.hf.kept.cutting import (
+    CutPrefix,
+    EncodedView,
+    attention_of,
+    method_of,
+    split_at_last_frame,
+)
+from model_adapters.hf.kept.store import PrefixStore
 from model_adapters.hf.limits import check_limit, wrap_memory_errors, wrap_model_errors
 from model_adapters.hf.loading.loaded import LoadedCheckpoint
 from model_adapters.hf.loading.rope import take_length_rope
@@ -24,7 +32,7 @@ from model_adapters.hf.sparse.rotation import find_rotations
 from model_adapters.hf.sparse.window import WindowAttention
 from model_adapters.options.attention import AttentionShape, Window, parse_attention
 from model_adapters.options.checkpoints import HfOptions
-from model_adapters.protocols import Decoding, Reply, Turn
+from model_adapters.protocols import CacheCut, Decoding, KeptCache, Reply, Turn
 
 
 class TransformersModel(HfModel):
@@ -35,6 +43,8 @@ class TransformersModel(HfModel):
     same frames encode them once.
     """
 
+    cuts_caches = True
+
     def __init__(self, name: str, loaded: LoadedCheckpoint, options: HfOptions) -> None:
         super().__init__(name, loaded, options)
         cache_bytes = options.feature_cache_mb * 2**20 if options.share_prefix else 0
@@ -42,16 +52,21 @@ class TransformersModel(HfModel):
             cache_bytes, Ahead(options.frame_threads, options.frames_ahead_mb * 2**20)
         )
         self._rope = take_length_rope(loaded.model)
-        self._prefix = Prefix(
-            loaded.model,
-            loaded.family,
+        self._prefix = self._new_prefix()
+        # What memories of the cache are cut from.
+        self._encoded = PrefixStore(self._new_prefix, options.encoded_mb * 2**20)
+        if options.attention is not None:
+            self._prefix.sparse = self._read_sparsely(parse_attention(options.attention))
+
+    def _new_prefix(self) -> Prefix:
+        return Prefix(
+            self._loaded.model,
+            self._loaded.family,
             self._embed,
             chunk_tokens=self._chunk_tokens,
             rope=self._rope,
-            storage=torch.device("cpu") if options.kv_offload else None,
+            storage=torch.device("cpu") if self._options.kv_offload else None,
         )
-        if options.attention is not None:
-            self._prefix.sparse = self._read_sparsely(parse_attention(options.attention))
 
     def _read_sparsely(self, shape: AttentionShape) -> SparseReading:
         """Return how sequences are read by the options.
@@ -88,13 +103,15 @@ class TransformersModel(HfModel):
     def close(self) -> None:
         """Free the KV cache, the features and the weights."""
         self._prefix.reset()
+        self._encoded.clear()
         self._embed.close()
         del self._prefix, self._embed, self._rope
         super().close()
 
     def forget(self) -> None:
-        """Drop the encoded sequence."""
+        """Drop what is encoded."""
         self._prefix.reset()
+        self._encoded.clear()
 
     def encode(self, pieces: Sequence[Piece]) -> torch.Tensor:
         """Encode a prompt anew, in two parts; return the next token's logits, (vocabulary,)."""
@@ -159,24 +176,28 @@ class TransformersModel(HfModel):
             for prompt in prompts
         ]
         n_shared = self._n_shared(prompts)
+        kept: list[KeptCache | None] = [None] * len(prompts)
         try:
             with (
                 wrap_model_errors(self.name),
                 wrap_memory_errors(self.name, sum(map(n_tokens, prompts))),
             ):
-                n_cached = (
-                    self._decode_branches(prompts, n_shared, replies)
-                    if n_shared
-                    else self._decode_each(prompts, replies)
-                )
+                if decoding.cache is not None:
+                    n_cached, kept = self._decode_behind_cuts(prompts, decoding.cache, replies)
+                elif n_shared:
+                    n_cached = self._decode_branches(prompts, n_shared, replies)
+                else:
+                    n_cached = self._decode_each(prompts, replies)
         except ModelError:
             # After running out of memory, the next request needs all of it.
-            self._prefix.reset()
+            self.forget()
             self._embed.clear()
             raise
         return [
-            end_reply(self._loaded, reply, [*token_ids(prompt)], self._embed.hash(prompt), cached)
-            for reply, prompt, cached in zip(replies, prompts, n_cached, strict=True)
+            end_reply(
+                self._loaded, reply, [*token_ids(prompt)], self._embed.hash(prompt), cached, part
+            )
+            for reply, prompt, cached, part in zip(replies, prompts, n_cached, kept, strict=True)
         ]
 
     def _n_shared(self, prompts: Sequence[Sequence[Piece]]) -> list[int]:
@@ -220,6 +241,51 @@ class TransformersModel(HfModel):
             logits[None], lambda tokens: self._prefix.feed(list(tokens.values()))[None], [reply]
         )
         return cached
+
+    def _decode_behind_cuts(
+        self, prompts: Sequence[Sequence[Piece]], cut: CacheCut, replies: Sequence[ReplyState]
+    ) -> tuple[list[int], list[KeptCache | None]]:
+        """Decode replies behind what is kept of the frames before the last one; return how many
+        tokens of each prompt were encoded already, and what was kept."""
+        if self.windows is None or self.windows or self._prefix.sparse is not None:
+            raise ModelError(
+                f"the cache of {self.name} cannot be cut, as not all layers see everything; use a "
+                "memory of frames"
+            )
+        asks = method_of(cut).asks
+        places = [split_at_last_frame(prompt) for prompt in prompts]
+        n_cached: list[int] = []
+        kept: list[KeptCache | None] = []
+        at = 0
+        while at < len(prompts):
+            opening, last = places[at]
+            before = prompts[at][:last]
+            group = [at]
+            while not asks and group[-1] + 1 < len(prompts):  # behind the same frames
+                following = group[-1] + 1
+                if prompts[following][: places[following][1]] != before:
+                    break
+                group.append(following)
+            afters = [prompts[number][last:] for number in group]
+            prefix, n_known = self._encoded.encode(before, exactly=asks)
+            view = EncodedView.of(prefix, before, opening, cut)
+            config = self._loaded.model.get_decoder().config
+            if asks:
+                view.attention = attention_of(prefix, config, afters[0])
+            cut_prefix = CutPrefix(config, view, cut, prefix.behind(last))
+            answer_together(
+                self._loaded.model,
+                self._embed,
+                prefix=cut_prefix,
+                prompts=afters,
+                n_shared=[0] * len(group),
+                replies=[replies[number] for number in group],
+                chunk_tokens=self._chunk_tokens,
+            )
+            n_cached += [prefix.tokens_in(n_known), *[prefix.tokens_in(last)] * (len(group) - 1)]
+            kept += [cut_prefix.kept] * len(group)
+            at = group[-1] + 1
+        return n_cached, kept
 
     def _decode_branches(
         self,

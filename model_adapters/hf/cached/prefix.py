@@ -75,8 +75,13 @@ class Prefix:
         return self.tokens_in(self.n_pieces)
 
     @property
-    def n_pieces(self) -> int:
+    def pieces(self) -> Sequence[Piece]:
         """Pieces in the sequence."""
+        return self._pieces
+
+    @property
+    def n_pieces(self) -> int:
+        """Number of pieces in the sequence."""
         return len(self._pieces)
 
     def tokens_in(self, n_pieces: int) -> int:

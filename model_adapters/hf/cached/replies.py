@@ -7,7 +7,7 @@ from model_adapters.hf.cached.choices import read_choices
 from model_adapters.hf.cached.decoding import ReplyState
 from model_adapters.hf.loading.loaded import LoadedCheckpoint
 from model_adapters.hf.prompting.hashing import hash_context
-from model_adapters.protocols import Decoding, Reply
+from model_adapters.protocols import Decoding, KeptCache, Reply
 from model_adapters.thinking import cut_at_stop
 
 
@@ -43,6 +43,7 @@ def end_reply(
     context: Sequence[int],
     frames_hash: str | None,
     n_cached: int,
+    kept: KeptCache | None = None,
 ) -> Reply:
     """Return a finished reply.
 
@@ -52,6 +53,7 @@ def end_reply(
         context: the ids of all tokens before it.
         frames_hash: hash of the pixels of its frames, if they are known.
         n_cached: tokens of the context that were not encoded again.
+        kept: what was kept of the cache, if it was cut.
     """
     return Reply(
         state.choice or reply_text(loaded, state.ids, state.decoding),
@@ -62,6 +64,7 @@ def end_reply(
         context_hash=hash_context(context),
         frames_hash=frames_hash,
         margins=None if state.margins is None else tuple(state.margins),
+        kept=kept,
     )
 
 

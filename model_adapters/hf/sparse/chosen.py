@@ -7,26 +7,29 @@ from typing import Protocol
 
 import torch
 from torch import Tensor
+from torch.nn.functional import pad, scaled_dot_product_attention
 
 from model_adapters.hf.sparse.interface import Plan, SeenBy
 from model_adapters.hf.sparse.kernel import Keys, attend
 from model_adapters.hf.sparse.layout import Layout
 from model_adapters.options.attention import BlockSparse, VerticalSlash
 
-_BLOCK = 64  # queries that are computed together, and keys of a block
-_LAST = 64  # queries at the end of a chunk, by which columns and diagonals are chosen
-# Chosen in any case, as published.
-_FIRST_COLUMNS, _NEAR_DIAGONALS = 30, 100
+_BLOCK = 64  # queries that are computed together, keys of a block, and distances of a band
+_LAST = 64  # queries at the end of a chunk, by which columns and bands are chosen
+# Chosen in any case, as published: 30 columns, and 100 distances or more.
+_FIRST_COLUMNS, _NEAR_BANDS = 30, 2
 
 
 class Choice(Protocol):
     """What heads chose for the queries of a chunk."""
 
-    def places(self, head: int, at: int, end: int) -> Tensor:
-        """Return the places of stored tokens that a query from `at` to `end` sees, (places,)."""
+    def keys(self, at: int, end: int) -> tuple[Tensor, Tensor]:
+        """Return what the queries from `at` to `end` see.
 
-    def seen(self, head: int, at: int, end: int, places: Tensor) -> Tensor:
-        """Return which of these each of them sees, as a mask that spreads to (queries, places)."""
+        Returns:
+            Places of stored tokens, (heads, places), some of which stand for nothing, and which of
+            them each query sees, as a mask that spreads to (heads, queries, places).
+        """
 
 
 class ChosenAttention:
@@ -63,27 +66,26 @@ class ChosenAttention:
             choice = _Lines(self._shape.share, query, key, columns, is_seen, scale)
         else:
             choice = _Blocks(self._shape.n_blocks, query, key, columns)
-        output = torch.empty_like(query)
+        heads = torch.arange(query.shape[0], device=query.device)
+        heads = heads.repeat_interleave(query.shape[1])[:, None]  # the key head of each head
+        outputs = []
         for at, end in _spans(n, _BLOCK):
-            for head in range(query.shape[0] * query.shape[1]):
-                group, within = divmod(head, query.shape[1])
-                places = choice.places(head, at, end)
-                places = places[places < len(columns) - n + end]
-                may = seen(rows.number[at:end], columns.number[places])
-                output[group, within, at:end] = attend(
-                    query[group : group + 1, within : within + 1, at:end],
-                    Keys(
-                        key[group : group + 1, :, places],
-                        value[group : group + 1, :, places],
-                        may & choice.seen(head, at, end, places),
-                    ),
-                    scale,
+            places, chosen = choice.keys(at, end)
+            may = seen(rows.number[at:end], columns.number[places]) & chosen
+            outputs.append(
+                scaled_dot_product_attention(
+                    query[..., at:end, :].flatten(0, 1)[None],
+                    key[heads, 0, places][None],
+                    value[heads, 0, places][None],
+                    attn_mask=may[None],
+                    scale=scale,
                 )
-        return output
+            )
+        return torch.cat(outputs, dim=-2)[0].unflatten(0, query.shape[:2])
 
 
 class _Lines:
-    """Columns, and diagonals, whose scores by the last queries of a chunk are the largest."""
+    """Columns, and bands of diagonals, whose scores by the last queries of a chunk are largest."""
 
     def __init__(
         self,
@@ -95,65 +97,65 @@ class _Lines:
         scale: float | None,
     ) -> None:
         n_rows, n_columns = seen.shape
-        self._n_queries = query.shape[-2]
+        self._before = n_columns - query.shape[-2]  # place of the first query
         factor = query.shape[-1] ** -0.5 if scale is None else scale
         scores = query[..., -n_rows:, :] @ key.transpose(-1, -2) * factor
         weights = scores.float().masked_fill(~seen, -torch.inf).softmax(dim=-1).flatten(0, 1)
-        n_chosen = max(1, round(share * n_columns))
         vertical = weights.sum(dim=1)  # (heads, stored)
         if bool((columns.first != columns.last).any()):
             vertical = _summed(vertical, columns.first)
         vertical[:, :_FIRST_COLUMNS] = torch.inf
+        self._columns = _largest(vertical, max(round(share * n_columns), _FIRST_COLUMNS))
         slash = _diagonals(weights)
-        slash[:, :_NEAR_DIAGONALS] = torch.inf
-        self._columns = _is_largest(vertical, n_chosen)
-        self._diagonals = _is_largest(slash, n_chosen)
+        bands = pad(slash, (0, -n_columns % _BLOCK)).unflatten(-1, (-1, _BLOCK)).sum(dim=-1)
+        bands[:, :_NEAR_BANDS] = torch.inf
+        n_bands = max(round(share * n_columns / _BLOCK), _NEAR_BANDS)
+        self._bands = _largest(bands, n_bands)  # (heads, chosen)
+        self._is_column = torch.zeros_like(vertical, dtype=torch.bool)
+        self._is_column.scatter_(-1, self._columns, True)
 
-    def places(self, head: int, at: int, end: int) -> Tensor:
+    def keys(self, at: int, end: int) -> tuple[Tensor, Tensor]:
         """See `Choice`."""
-        first, last = self._number(at), self._number(end - 1)
-        # How many chosen diagonals are nearer than each distance.
-        nearer = torch.nn.functional.pad(self._diagonals[head].cumsum(0), (1, 0))
-        distance = last - torch.arange(len(nearer) - 1, device=nearer.device)  # from the last query
-        n_on = nearer[(distance + 1).clamp(min=0)] - nearer[(distance - last + first).clamp(min=0)]
-        return (self._columns[head] | (n_on > 0)).nonzero()[:, 0]
-
-    def seen(self, head: int, at: int, end: int, places: Tensor) -> Tensor:
-        """See `Choice`."""
-        rows = torch.arange(self._number(at), self._number(end), device=places.device)
-        distance = rows[:, None] - places
-        on_diagonal = self._diagonals[head][distance.clamp(min=0)] & (distance >= 0)
-        return self._columns[head][places] | on_diagonal
-
-    def _number(self, query: int) -> int:
-        return self._columns.shape[-1] - self._n_queries + query
+        rows = torch.arange(at, end, device=self._bands.device) + self._before
+        # A band of 64 distances, of 64 queries, is over 127 keys.
+        offset = torch.arange(1 - _BLOCK, len(rows), device=rows.device)
+        banded = (rows[0] - _BLOCK * self._bands)[..., None] + offset
+        within = (rows - rows[0])[:, None] - offset  # distance within the band
+        in_band = ((within >= 0) & (within < _BLOCK)).repeat(1, self._bands.shape[-1])
+        places = banded.flatten(1)
+        is_new = (places >= 0) & ~self._is_column.gather(-1, places.clamp(min=0))
+        whole = is_new.new_ones(len(is_new), len(rows), self._columns.shape[-1])
+        seen = torch.cat((whole, in_band & is_new[:, None]), dim=-1)
+        return torch.cat((self._columns, places.clamp(min=0)), dim=-1), seen
 
 
 class _Blocks:
     """Blocks of keys whose mean key fits the mean query of a block best, the queries' own too."""
 
     def __init__(self, n_blocks: int, query: Tensor, key: Tensor, columns: Layout) -> None:
-        n = query.shape[-2]
         number = columns.number if torch.equal(columns.first, columns.last) else columns.first
-        self._block_of = _blocks(number, len(columns))
-        means = _means(key, self._block_of)  # (key heads, 1, blocks, head size)
-        own = self._block_of[-n:]
-        chosen = []
-        for at, end in _spans(n, _BLOCK):
+        block_of = _blocks(number, len(columns))
+        self._widths = block_of.bincount()
+        self._begins = self._widths.cumsum(0) - self._widths
+        means = _means(key, block_of)  # (key heads, 1, blocks, head size)
+        own = block_of[-query.shape[-2] :]
+        self._chosen = []
+        for at, end in _spans(query.shape[-2], _BLOCK):
             pooled = query[..., at:end, :].mean(dim=-2, keepdim=True)
             scores = (pooled @ means.transpose(-1, -2))[..., 0, :].flatten(0, 1)
-            scores[:, int(own[end - 1]) + 1 :] = -torch.inf
-            scores[:, int(own[at]) : int(own[end - 1]) + 1] = torch.inf
-            chosen.append(_is_largest(scores, n_blocks))
-        self._chosen = chosen
+            first, last = int(own[at]), int(own[end - 1])
+            scores[:, first : last + 1] = torch.inf
+            n_chosen = min(max(n_blocks, last + 1 - first), last + 1)
+            self._chosen.append(_largest(scores[:, : last + 1], n_chosen))
 
-    def places(self, head: int, at: int, end: int) -> Tensor:
+    def keys(self, at: int, end: int) -> tuple[Tensor, Tensor]:
         """See `Choice`."""
-        return self._chosen[at // _BLOCK][head][self._block_of].nonzero()[:, 0]
-
-    def seen(self, head: int, at: int, end: int, places: Tensor) -> Tensor:
-        """See `Choice`."""
-        return places.new_ones((), dtype=torch.bool)
+        chosen = self._chosen[at // _BLOCK]
+        widths = self._widths[chosen]
+        offset = torch.arange(int(widths.max()), device=chosen.device)
+        within = offset < widths[..., None]
+        places = torch.where(within, self._begins[chosen][..., None] + offset, 0)
+        return places.flatten(1), within.flatten(1)[:, None]
 
 
 def _spans(n: int, size: int) -> Iterator[tuple[int, int]]:
@@ -161,20 +163,17 @@ def _spans(n: int, size: int) -> Iterator[tuple[int, int]]:
         yield at, min(at + size, n)
 
 
-def _is_largest(scores: Tensor, n: int) -> Tensor:
-    """Return which are the n largest in each row, and all that are infinite; of equal ones the
-    first."""
+def _largest(scores: Tensor, n: int) -> Tensor:
+    """Return the places of the n largest of each row, ascending; of equal ones the first."""
     order = scores.argsort(dim=-1, descending=True, stable=True)
-    chosen = torch.zeros_like(scores, dtype=torch.bool)
-    chosen.scatter_(-1, order[:, :n], True)
-    return (chosen | scores.isposinf()) & ~scores.isneginf()
+    return order[:, :n].sort(dim=-1).values
 
 
 def _diagonals(weights: Tensor) -> Tensor:
     """Return the sum along each diagonal of the last rows, by its distance from the end: (heads,
     distances)."""
     n_rows, n_columns = weights.shape[-2:]
-    reversed_rows = torch.nn.functional.pad(weights.flip(-1), (0, n_rows))
+    reversed_rows = pad(weights.flip(-1), (0, n_rows))
     total = torch.zeros_like(weights[:, 0])
     for row in range(n_rows):
         begin = n_rows - 1 - row

@@ -13,7 +13,7 @@ from infthor_eval.errors import ModelError
 _NOT_COMPUTED = ("softcap", "s_aux", "position_bias")  # what some models add to the scores
 # Whether a token sees another, by batch, head and both numbers in the sequence.
 MaskFunction = Callable[[Tensor, Tensor, Tensor, Tensor], Tensor]
-# Whether tokens of these numbers see those of others, (queries, keys).
+# Whether tokens of these numbers see those of others, (queries, keys), or by head.
 SeenBy = Callable[[Tensor, Tensor], Tensor]
 
 
@@ -80,7 +80,17 @@ def require_plain(attention_mask: Tensor | None, others: dict[str, Any], hint: s
 
 
 def seen_by(mask_function: MaskFunction, rows: Tensor, columns: Tensor) -> Tensor:
-    """Return which tokens see which by a model's rule of numbers, (rows, columns)."""
+    """Return which tokens see which by a model's rule of numbers.
+
+    Args:
+        mask_function: the rule.
+        rows: numbers, (rows,).
+        columns: numbers, (columns,), or of each head, (heads, columns).
+
+    Returns:
+        (rows, columns), or (heads, rows, columns).
+    """
     first = rows.new_zeros(1, 1, 1, 1)  # the only batch, and any head
-    seen = mask_function(first, first, rows[None, None, :, None], columns[None, None, None])
-    return seen[0, 0].expand(len(rows), len(columns))
+    listed = columns.reshape(-1, 1, 1, columns.shape[-1])
+    seen = mask_function(first, first, rows[None, None, :, None], listed)[:, 0]
+    return seen.expand(len(listed), len(rows), -1).reshape(*columns.shape[:-1], len(rows), -1)

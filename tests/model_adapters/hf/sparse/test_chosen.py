@@ -10,7 +10,7 @@ from model_adapters.hf.sparse.chosen import ChosenAttention
 from model_adapters.hf.sparse.layout import Layout
 from model_adapters.options.attention import BlockSparse, VerticalSlash
 
-BLOCK, LAST, FIRST, NEAR = 4, 3, 1, 2  # so that short sequences have many
+BLOCK, LAST, FIRST, NEAR = 4, 3, 1, 1  # so that short sequences have many
 SHARED = 2  # heads that share a key head
 
 
@@ -19,7 +19,7 @@ def small(monkeypatch):
     monkeypatch.setattr(chosen, "_BLOCK", BLOCK)
     monkeypatch.setattr(chosen, "_LAST", LAST)
     monkeypatch.setattr(chosen, "_FIRST_COLUMNS", FIRST)
-    monkeypatch.setattr(chosen, "_NEAR_DIAGONALS", NEAR)
+    monkeypatch.setattr(chosen, "_NEAR_BANDS", NEAR)
 
 
 class _Frame:
@@ -28,7 +28,7 @@ class _Frame:
 
 
 def _causal(rows, columns):
-    return columns <= rows[:, None]
+    return columns[..., None, :] <= rows[:, None]
 
 
 def _lines(query, key, share, of):
@@ -40,7 +40,7 @@ def _lines(query, key, share, of):
         until = n_keys - LAST + row + 1
         scores = key[:until] @ query[n - LAST + row] / query.shape[1] ** 0.5
         weights[row, :until] = scores.softmax(0)
-    count = max(1, round(share * n_keys))
+    count = round(share * n_keys)
     column = [
         float(weights[:, [at for at in range(n_keys) if of[at] == frame]].sum()) for frame in of
     ]
@@ -49,11 +49,12 @@ def _lines(query, key, share, of):
         for at in range(n_keys - LAST + row + 1):
             diagonal[n_keys - LAST + row - at] += float(weights[row, at])
     columns = _largest(column, count, FIRST)
-    diagonals = _largest(diagonal, count, NEAR)
+    bands = [sum(diagonal[at : at + BLOCK]) for at in range(0, n_keys, BLOCK)]
+    chosen = _largest(bands, max(1, round(share * n_keys / BLOCK)), NEAR)
     return torch.tensor(
         [
             [
-                at <= before + row and (at in columns or before + row - at in diagonals)
+                at <= before + row and (at in columns or (before + row - at) // BLOCK in chosen)
                 for at in range(n_keys)
             ]
             for row in range(n)

@@ -23,7 +23,7 @@ def short(monkeypatch):
         "_BLOCK": 8,
         "_LAST": 8,
         "_FIRST_COLUMNS": 1,
-        "_NEAR_DIAGONALS": 2,
+        "_NEAR_BANDS": 2,
     }.items():
         monkeypatch.setattr(chosen, name, number)
 

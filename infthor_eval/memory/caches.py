@@ -1,0 +1,96 @@
+"""Memories in the cache of the model under test: what is kept of a trajectory that it has encoded.
+
+The frames before the current view are encoded, their keys and values are cut to the budget, and the
+question is asked behind what is left (`model_adapters.hf.kept`). Memories of frames choose as those
+that show frames do, so that both can be compared: cut after the whole was encoded, or encoded
+alone.
+"""
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+from infthor_eval.memory.frames import Last, Oracle, Random, Uniform
+from infthor_eval.memory.protocol import (
+    MemoryCapabilities,
+    Observation,
+    Query,
+    Recalled,
+    TrajectoryFacts,
+)
+
+_METHODS = "model_adapters.hf.kept.methods"
+FRAMES = f"{_METHODS}:Frames"  # keeps the frames that the memory recalls
+
+
+class KvWindow(Last):
+    """Keys and values of the last frames before the current view."""
+
+    capabilities: ClassVar[MemoryCapabilities] = MemoryCapabilities(cache=FRAMES)
+
+
+class KvUniform(Uniform):
+    """Keys and values of frames at even distances."""
+
+    capabilities: ClassVar[MemoryCapabilities] = MemoryCapabilities(cache=FRAMES)
+
+
+class KvRandom(Random):
+    """Keys and values of frames drawn for each question."""
+
+    capabilities: ClassVar[MemoryCapabilities] = MemoryCapabilities(cache=FRAMES)
+
+
+class KvOracle(Oracle):
+    """Keys and values of the clue frames, and of others drawn until there are as many."""
+
+    capabilities: ClassVar[MemoryCapabilities] = MemoryCapabilities(privileged=True, cache=FRAMES)
+
+
+class _KvTokens:
+    """Base of memories whose method chooses tokens: no frame is recalled as a whole."""
+
+    capabilities: ClassVar[MemoryCapabilities]
+
+    def identity(self) -> Mapping[str, Any]:
+        """See `Memory`."""
+        return {}
+
+    def begin(self, facts: TrajectoryFacts) -> None:
+        """See `Memory`."""
+
+    def observe(self, observation: Observation) -> None:
+        """See `Memory`."""
+
+    def recall(self, query: Query, budget: int | None) -> Recalled:
+        """See `Memory`."""
+        return []
+
+
+class KvSinks(_KvTokens):
+    """Keys and values of the first four tokens and the last ones (StreamingLLM)."""
+
+    capabilities = MemoryCapabilities(cache=f"{_METHODS}:Sinks")
+
+
+class KvNorm(_KvTokens):
+    """Keys of the smallest norms, by head, with their values."""
+
+    capabilities = MemoryCapabilities(cache=f"{_METHODS}:Norm")
+
+
+class KvQuestion(_KvTokens):
+    """What the question attends to, by head (SnapKV); everything was kept until it was asked."""
+
+    capabilities = MemoryCapabilities(privileged=True, cache=f"{_METHODS}:Question")
+
+
+class KvMerge(_KvTokens):
+    """Tokens at even distances, each averaged with those whose keys are most like its own."""
+
+    capabilities = MemoryCapabilities(cache=f"{_METHODS}:Merge")
+
+
+class KvEightBits(_KvTokens):
+    """Everything in 8 bits, whatever the budget is."""
+
+    capabilities = MemoryCapabilities(cache=f"{_METHODS}:EightBits")

@@ -1,0 +1,206 @@
+"""Cutting the cache of an encoded sequence, and standing for it when questions follow."""
+
+import importlib
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any
+
+import torch
+from torch import Tensor
+from transformers.masking_utils import AttentionMaskInterface
+from transformers.modeling_utils import ALL_ATTENTION_FUNCTIONS
+
+from infthor_eval.errors import ModelError
+from model_adapters.hf.cached.kv_cache import BufferedCache, BufferedLayer
+from model_adapters.hf.cached.prefix import Prefix
+from model_adapters.hf.kept.methods import CacheMethod
+from model_adapters.hf.prompting.prompt import Piece, n_tokens
+from model_adapters.hf.sparse.interface import attending
+from model_adapters.protocols import CacheCut, KeptCache
+
+
+def method_of(cut: CacheCut) -> CacheMethod:
+    """Return the method of a cut.
+
+    Raises:
+        ModelError: it cannot be imported.
+    """
+    module, _, name = cut.method.partition(":")
+    try:
+        method: CacheMethod = getattr(importlib.import_module(module), name)()
+    except (ImportError, AttributeError, TypeError) as error:
+        raise ModelError(f"the method {cut.method} of a cache cannot be made ({error})") from error
+    return method
+
+
+def split_at_last_frame(pieces: Sequence[Piece]) -> tuple[int, int]:
+    """Return how many pieces there are before the first frame, and before the last one.
+
+    Raises:
+        ModelError: there is no frame.
+    """
+    places = [at for at, piece in enumerate(pieces) if not isinstance(piece, int)]
+    if not places:
+        raise ModelError("a cache that is cut needs frames; leave the memory out")
+    return places[0], places[-1]
+
+
+@dataclass
+class EncodedView:
+    """Tokens of a sequence from the first frame on; see `CacheView`.
+
+    Attributes:
+        cache: keys and values of the sequence.
+        begin: tokens before the first frame, which are kept in any case.
+        n_tokens: tokens behind these.
+        is_frame: which of them are a frame's own, and not text behind it, (tokens,).
+        attention: how much a question attends to each token, by layer.
+    """
+
+    cache: BufferedCache
+    begin: int
+    n_tokens: int
+    budget: int
+    frames: Tensor
+    is_frame: Tensor
+    chosen: Sequence[int] | None
+    seed: int
+    attention: list[Tensor] = field(default_factory=list)
+
+    @classmethod
+    def of(
+        cls, prefix: Prefix, pieces: Sequence[Piece], n_opening: int, cut: CacheCut
+    ) -> "EncodedView":
+        """Return the view of the first pieces of a sequence, of which some are before frames."""
+        begin = n_tokens(pieces[:n_opening])
+        widths = torch.tensor([n_tokens([piece]) for piece in pieces[n_opening:]])
+        is_frame = torch.tensor([not isinstance(piece, int) for piece in pieces[n_opening:]])
+        frames = (is_frame.cumsum(0) - 1).repeat_interleave(widths)
+        n = len(frames)
+        return cls(
+            cache=prefix.cache,
+            begin=begin,
+            n_tokens=n,
+            budget=n if cut.budget is None else min(cut.budget, n),
+            frames=frames,
+            is_frame=is_frame.repeat_interleave(widths),
+            chosen=cut.frames,
+            seed=cut.seed,
+        )
+
+    def keys(self, layer: int) -> Tensor:
+        """See `CacheView`."""
+        return self._states(layer).keys[0, :, self.begin : self.begin + self.n_tokens]
+
+    def values(self, layer: int) -> Tensor:
+        """See `CacheView`."""
+        return self._states(layer).values[0, :, self.begin : self.begin + self.n_tokens]
+
+    def asked(self, layer: int) -> Tensor:
+        """See `CacheView`."""
+        return self.attention[layer][:, self.begin : self.begin + self.n_tokens]
+
+    def opening(self, layer: int) -> tuple[Tensor, Tensor]:
+        """Return keys and values of what is before the first frame."""
+        states = self._states(layer)
+        return states.keys[0, :, : self.begin], states.values[0, :, : self.begin]
+
+    def _states(self, layer: int) -> BufferedLayer:
+        states = self.cache.layers[layer]
+        assert isinstance(states, BufferedLayer)
+        return states
+
+
+class CutPrefix:
+    """What is kept of a sequence, in place of its `Prefix` for what follows.
+
+    Attributes:
+        cache: the keys and values that are kept.
+        kept: how much that is.
+        sparse: None: what follows sees all of it.
+    """
+
+    sparse = None
+
+    @torch.inference_mode()
+    def __init__(self, config: Any, view: EncodedView, cut: CacheCut, end: int) -> None:
+        """Cut what a view shows; `end` is the position of the next token."""
+        method = method_of(cut)
+        self.cache = BufferedCache(config)
+        self._end = end
+        shares = []
+        counts = []
+        clues = torch.isin(view.frames, torch.tensor([*cut.clues])) & view.is_frame
+        for layer in range(config.num_hidden_layers):
+            places = method.keep(view, layer)
+            n_counted = int(view.is_frame[places].sum(dim=-1).max()) if len(places) else 0
+            if n_counted > view.budget:
+                raise ModelError(
+                    f"the method {cut.method} keeps {n_counted} tokens of frames where the budget "
+                    f"is {view.budget}"
+                )
+            pairs = zip(view.opening(layer), method.states(view, layer, places), strict=True)
+            keys, values = (torch.cat(pair, dim=1)[None] for pair in pairs)
+            self.cache.update(keys, values, layer)
+            counts.append(places.shape[-1])
+            if cut.clues:
+                n_found = clues[places].float().sum(dim=-1).mean()
+                shares.append(float(n_found / clues.sum()))
+        self.kept = KeptCache(
+            tokens=sum(counts) / len(counts),
+            bytes=sum(2 * layer.keys.nbytes for layer in self.cache.layers),
+            clues=sum(shares) / len(shares) if shares else None,
+        )
+
+    @property
+    def n_tokens(self) -> int:
+        """Tokens that are kept, with those before the first frame."""
+        return self.cache.get_seq_length()
+
+    n_pieces = 0
+
+    def tokens_in(self, n_pieces: int) -> int:
+        """Return the tokens before what follows, which has no pieces in common with it."""
+        assert n_pieces == 0
+        return self.n_tokens
+
+    def behind(self, n_pieces: int) -> int:
+        """Return the position behind the sequence."""
+        assert n_pieces == 0
+        return self._end
+
+    @contextmanager
+    def extended(self, continuations: Sequence[Sequence[Piece]], reserve: int) -> Iterator[None]:
+        """See `Prefix`; nothing is asked behind it afterwards."""
+        self.cache.reserve(self.n_tokens + sum(map(n_tokens, continuations)) + reserve)
+        yield
+
+
+@torch.inference_mode()
+def attention_of(prefix: Prefix, config: Any, pieces: Sequence[Piece]) -> list[Tensor]:
+    """Return how much pieces attend to a sequence before them, by layer: (key heads, tokens).
+
+    The sequence is as it was afterwards.
+    """
+    n_before = prefix.n_tokens
+    n_pieces = prefix.n_pieces
+    found: list[list[Tensor]] = [[] for _ in range(config.num_hidden_layers)]
+    dense = ALL_ATTENTION_FUNCTIONS["sdpa"]
+
+    def attention(module: Any, query: Tensor, key: Tensor, *others: Any, **options: Any) -> Any:
+        scale = options.get("scaling") or query.shape[-1] ** -0.5
+        heads = query[0].unflatten(0, (key.shape[1], -1))  # (key heads, sharing, new, head size)
+        scores = (heads @ key[0, :, None].transpose(-1, -2)).float() * scale
+        n_new = query.shape[2]
+        places = torch.arange(key.shape[2], device=key.device)
+        later = places > places[-n_new:, None]
+        weights = scores.masked_fill(later, -torch.inf).softmax(dim=-1)
+        found[module.layer_idx].append(weights[..., :n_before].mean(dim=1).sum(dim=1))
+        return dense(module, query, key, *others, **options)
+
+    mask = AttentionMaskInterface._global_mapping["sdpa"]
+    with attending(config, f"watched_{id(found)}", attention, mask):
+        prefix.feed(pieces)
+    prefix.cut(n_pieces)
+    return [torch.stack(parts).sum(dim=0) for parts in found]
