@@ -99,8 +99,9 @@ class _Lines:
         n_rows, n_columns = seen.shape
         self._before = n_columns - query.shape[-2]  # place of the first query
         factor = query.shape[-1] ** -0.5 if scale is None else scale
-        scores = query[..., -n_rows:, :] @ key.transpose(-1, -2) * factor
-        weights = scores.float().masked_fill(~seen, -torch.inf).softmax(dim=-1).flatten(0, 1)
+        last = (query[..., -n_rows:, :] * factor).flatten(1, 2)  # heads that share keys together
+        scores = (last @ key[:, 0].transpose(-1, -2)).float().unflatten(1, (-1, n_rows))
+        weights = scores.masked_fill_(~seen, -torch.inf).softmax(dim=-1).flatten(0, 1)
         vertical = weights.sum(dim=1)  # (heads, stored)
         if bool((columns.first != columns.last).any()):
             vertical = _summed(vertical, columns.first)
@@ -172,13 +173,12 @@ def _largest(scores: Tensor, n: int) -> Tensor:
 def _diagonals(weights: Tensor) -> Tensor:
     """Return the sum along each diagonal of the last rows, by its distance from the end: (heads,
     distances)."""
-    n_rows, n_columns = weights.shape[-2:]
-    reversed_rows = pad(weights.flip(-1), (0, n_rows))
-    total = torch.zeros_like(weights[:, 0])
-    for row in range(n_rows):
-        begin = n_rows - 1 - row
-        total += reversed_rows[:, row, begin : begin + n_columns]
-    return total
+    n_heads, n_rows, n_columns = weights.shape
+    # The last row first, each from its end on; row r of the view begins r places later.
+    turned = pad(weights.flip(-1, -2), (0, n_rows))
+    width = n_columns + n_rows
+    skewed = turned.as_strided((n_heads, n_rows, n_columns), (n_rows * width, width + 1, 1))
+    return skewed.sum(dim=1)
 
 
 def _summed(scores: Tensor, groups: Tensor) -> Tensor:
