@@ -17,8 +17,8 @@ from model_adapters.hf.kept.cutting import (
     CutPrefix,
     EncodedView,
     attention_of,
+    grouped,
     method_of,
-    split_at_last_frame,
 )
 from model_adapters.hf.kept.store import PrefixStore
 from model_adapters.hf.limits import check_limit, wrap_memory_errors, wrap_model_errors
@@ -253,38 +253,28 @@ class TransformersModel(HfModel):
                 "memory of frames"
             )
         asks = method_of(cut).asks
-        places = [split_at_last_frame(prompt) for prompt in prompts]
+        config = self._loaded.model.get_decoder().config
         n_cached: list[int] = []
         kept: list[KeptCache | None] = []
-        at = 0
-        while at < len(prompts):
-            opening, last = places[at]
-            before = prompts[at][:last]
-            group = [at]
-            while not asks and group[-1] + 1 < len(prompts):  # behind the same frames
-                following = group[-1] + 1
-                if prompts[following][: places[following][1]] != before:
-                    break
-                group.append(following)
-            afters = [prompts[number][last:] for number in group]
-            prefix, n_known = self._encoded.encode(before, exactly=asks)
-            view = EncodedView.of(prefix, before, opening, cut)
-            config = self._loaded.model.get_decoder().config
+        for group in grouped(prompts, together=not asks):
+            prefix, n_known = self._encoded.encode(group.before, exactly=asks)
+            view = EncodedView.of(prefix, group.before, group.n_opening, cut)
             if asks:
-                view.attention = attention_of(prefix, config, afters[0])
-            cut_prefix = CutPrefix(config, view, cut, prefix.behind(last))
+                view.attention = attention_of(prefix, config, group.afters[0])
+            n_before = len(group.before)
+            cut_prefix = CutPrefix(config, view, cut, prefix.behind(n_before))
             answer_together(
                 self._loaded.model,
                 self._embed,
                 prefix=cut_prefix,
-                prompts=afters,
-                n_shared=[0] * len(group),
-                replies=[replies[number] for number in group],
+                prompts=group.afters,
+                n_shared=[0] * len(group.afters),
+                replies=[replies[number] for number in group.numbers],
                 chunk_tokens=self._chunk_tokens,
             )
-            n_cached += [prefix.tokens_in(n_known), *[prefix.tokens_in(last)] * (len(group) - 1)]
-            kept += [cut_prefix.kept] * len(group)
-            at = group[-1] + 1
+            known = [n_known, *[n_before] * (len(group.afters) - 1)]
+            n_cached += map(prefix.tokens_in, known)
+            kept += [cut_prefix.kept] * len(group.afters)
         return n_cached, kept
 
     def _decode_branches(

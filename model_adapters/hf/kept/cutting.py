@@ -4,7 +4,7 @@ import importlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import torch
 from torch import Tensor
@@ -44,6 +44,37 @@ def split_at_last_frame(pieces: Sequence[Piece]) -> tuple[int, int]:
     if not places:
         raise ModelError("a cache that is cut needs frames; leave the memory out")
     return places[0], places[-1]
+
+
+class Behind(NamedTuple):
+    """Prompts on the same frames before the last one.
+
+    Attributes:
+        numbers: which of the prompts.
+        before: their pieces before the last frame.
+        n_opening: how many of these are before the first one.
+        afters: the other pieces of each.
+    """
+
+    numbers: list[int]
+    before: Sequence[Piece]
+    n_opening: int
+    afters: list[Sequence[Piece]]
+
+
+def grouped(prompts: Sequence[Sequence[Piece]], *, together: bool) -> Iterator[Behind]:
+    """Yield prompts by what is cut: neighbours on the same frames together, or each by itself."""
+    group: Behind | None = None
+    for number, prompt in enumerate(prompts):
+        opening, last = split_at_last_frame(prompt)
+        if group is None or not together or prompt[:last] != group.before:
+            if group is not None:
+                yield group
+            group = Behind([], prompt[:last], opening, [])
+        group.numbers.append(number)
+        group.afters.append(prompt[last:])
+    if group is not None:
+        yield group
 
 
 @dataclass
@@ -131,6 +162,7 @@ class CutPrefix:
         self._end = end
         shares = []
         counts = []
+        n_bytes = 0
         clues = torch.isin(view.frames, torch.tensor([*cut.clues])) & view.is_frame
         for layer in range(config.num_hidden_layers):
             places = method.keep(view, layer)
@@ -143,13 +175,14 @@ class CutPrefix:
             pairs = zip(view.opening(layer), method.states(view, layer, places), strict=True)
             keys, values = (torch.cat(pair, dim=1)[None] for pair in pairs)
             self.cache.update(keys, values, layer)
+            n_bytes += method.n_bytes(keys, values)
             counts.append(places.shape[-1])
             if cut.clues:
                 n_found = clues[places].float().sum(dim=-1).mean()
                 shares.append(float(n_found / clues.sum()))
         self.kept = KeptCache(
             tokens=sum(counts) / len(counts),
-            bytes=sum(2 * layer.keys.nbytes for layer in self.cache.layers),
+            bytes=n_bytes,
             clues=sum(shares) / len(shares) if shares else None,
         )
 

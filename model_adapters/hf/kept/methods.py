@@ -53,6 +53,10 @@ class CacheMethod:
 
     asks: ClassVar[bool] = False
 
+    def n_bytes(self, keys: Tensor, values: Tensor) -> int:
+        """Return the bytes that these take where they are stored."""
+        return keys.nbytes + values.nbytes
+
     def keep(self, view: CacheView, layer: int) -> Tensor:
         """Return the places that are kept of a layer, ascending: (kept,), or (key heads, kept)."""
         raise NotImplementedError
@@ -118,7 +122,7 @@ class Merge(CacheMethod):
         unit = normalize(keys.float(), dim=-1)
         nearest = (unit @ unit[:, places].transpose(-1, -2)).argmax(dim=-1)  # (heads, tokens)
         nearest[:, places] = torch.arange(len(places), device=places.device)
-        return tuple(_means(states, nearest, len(places)) for states in (keys, values))  # type: ignore[return-value]
+        return _means(keys, nearest, len(places)), _means(values, nearest, len(places))
 
 
 class EightBits(CacheMethod):
@@ -132,6 +136,10 @@ class EightBits(CacheMethod):
         """See `CacheMethod`."""
         keys, values = super().states(view, layer, places)
         return _rounded(keys), _rounded(values)
+
+    def n_bytes(self, keys: Tensor, values: Tensor) -> int:
+        """A byte for each number, and a scale for each token and head."""
+        return sum(it.numel() + it[..., 0].numel() * it.element_size() for it in (keys, values))
 
 
 def gathered(states: Tensor, places: Tensor) -> Tensor:
