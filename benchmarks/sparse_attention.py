@@ -4,7 +4,12 @@
 
 A language model with random weights, four layers of 16 heads of 64 (4 of keys), reads random words
 by the harness's own encoding, in chunks of 1,024. `all` is dense attention by torch's kernel. Times
-are of attention alone, all layers together.
+are of attention alone, all layers together, and of all of encoding.
+
+On a GPU (not run yet; rehearsed here with `--shape small --tokens 2000`), six minutes at most:
+
+    python -m benchmarks.sparse_attention --device cuda --dtype bfloat16 --shape 7b \\
+        --tokens 64000,256000 --dense-up-to 256000 --check
 """
 
 import argparse
@@ -12,7 +17,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import torch
 from transformers import AutoModelForCausalLM, Qwen2Config
@@ -24,6 +29,23 @@ from model_adapters.hf.sparse.reading import SparseReading
 from model_adapters.tiny.tokenizer import train_tokenizer
 
 DENSE = "all"
+SHAPES: dict[str, dict[str, int]] = {
+    "small": {
+        "hidden_size": 256,
+        "intermediate_size": 256,
+        "num_hidden_layers": 4,
+        "num_attention_heads": 16,
+        "num_key_value_heads": 4,
+        "head_dim": 64,
+    },
+    "7b": {  # of Qwen2.5
+        "hidden_size": 3584,
+        "intermediate_size": 18944,
+        "num_hidden_layers": 28,
+        "num_attention_heads": 28,
+        "num_key_value_heads": 4,
+    },
+}
 
 
 class Clock:
@@ -44,29 +66,29 @@ class Clock:
         return call
 
 
-def save_model(folder: Path) -> None:
-    """Save a language model with random weights whose cost is attention."""
+def save_model(folder: Path, shape: str, dtype: torch.dtype) -> None:
+    """Save a language model with random weights, of a shape whose cost is attention or of 7B."""
     tokenizer = train_tokenizer(
         ("<s>", "<end>", "<pad>"), end="<end>", pad="<pad>", begin="<s>", named={}
     )
     tokenizer.save_pretrained(folder)
     torch.manual_seed(0)
-    config = Qwen2Config(
-        vocab_size=len(tokenizer),
-        hidden_size=256,
-        intermediate_size=256,
-        num_hidden_layers=4,
-        num_attention_heads=16,
-        num_key_value_heads=4,
-        head_dim=64,
-        max_position_embeddings=2**20,
-    )
-    AutoModelForCausalLM.from_config(config).save_pretrained(folder)
+    config = Qwen2Config(vocab_size=len(tokenizer), max_position_embeddings=2**20, **SHAPES[shape])
+    AutoModelForCausalLM.from_config(config, dtype=dtype).save_pretrained(folder)
 
 
-def measure(folder: Path, attention: str, n_tokens: int) -> tuple[float, int]:
-    """Return the seconds of attention of reading so many tokens, and the bytes of the cache."""
-    options = {"pretrained": str(folder), "prompt": "plain", "device": "cpu"}
+class Measured(NamedTuple):
+    """Seconds of attention and of encoding, bytes of the cache, and the next token's logits."""
+
+    attention: float
+    encoding: float
+    n_bytes: int
+    logits: torch.Tensor
+
+
+def measure(folder: Path, attention: str, n_tokens: int, device: str) -> Measured:
+    """Return what reading so many tokens takes."""
+    options = {"pretrained": str(folder), "prompt": "plain", "device": device}
     if attention != DENSE:
         options["attention"] = attention
     model: Any = load("hf-lm", options, 0)
@@ -78,14 +100,24 @@ def measure(folder: Path, attention: str, n_tokens: int) -> tuple[float, int]:
     SparseReading._attention = clock.timed(sparse)  # type: ignore[method-assign]
     try:
         model.forget()
-        model._prefix.feed(words)
+        start = time.perf_counter()
+        logits = model._prefix.feed(words).cpu()
+        encoding = time.perf_counter() - start
     finally:
         ALL_ATTENTION_FUNCTIONS["sdpa"] = dense
         SparseReading._attention = sparse  # type: ignore[method-assign]
     layers = [it for it in model._prefix.cache.layers if isinstance(it, BufferedLayer)]
     n_bytes = sum(layer.n_bytes for layer in layers)
     model.close()
-    return clock.seconds, n_bytes
+    return Measured(clock.seconds, encoding, n_bytes, logits)
+
+
+def check(folder: Path, device: str) -> None:
+    """Print whether a window as long as the context has the logits of dense attention."""
+    dense = measure(folder, DENSE, 2000, device).logits
+    window = measure(folder, "sinks:64+window:2000", 2000, device).logits
+    difference = float((window - dense).abs().max() / dense.abs().max())
+    print(f"window of all: largest difference of logits {difference:.1e}")
 
 
 def main() -> None:
@@ -94,16 +126,29 @@ def main() -> None:
     parser.add_argument("--tokens", default="8000,32000")
     parser.add_argument("--attention", default=f"{DENSE},sinks:64+window:4096,sinks:64+window:1024")
     parser.add_argument("--dense-up-to", type=int, default=32_000)
+    parser.add_argument("--device", default="cpu")
+    parser.add_argument("--dtype", default="float32")
+    parser.add_argument("--shape", choices=SHAPES, default="small")
+    parser.add_argument("--check", action="store_true")
     arguments = parser.parse_args()
     lengths = [int(text) for text in arguments.tokens.split(",")]
     with tempfile.TemporaryDirectory() as folder:
-        save_model(Path(folder))
+        save_model(Path(folder), arguments.shape, getattr(torch, arguments.dtype))
+        if arguments.check:
+            check(Path(folder), arguments.device)
         for attention in arguments.attention.split(","):
             for n_tokens in lengths:
                 if attention == DENSE and n_tokens > arguments.dense_up_to:
                     continue
-                seconds, n_bytes = measure(Path(folder), attention, n_tokens)
-                print(f"{attention}, {n_tokens:,} tokens: {seconds:.1f} s, {n_bytes / 1e6:.1f} MB")
+                found = measure(Path(folder), attention, n_tokens, arguments.device)
+                peak = ""
+                if arguments.device.startswith("cuda"):
+                    peak = f", peak {torch.cuda.max_memory_allocated() / 1e9:.1f} GB"
+                    torch.cuda.reset_peak_memory_stats()
+                print(
+                    f"{attention}, {n_tokens:,} tokens: attention {found.attention:.1f} s, all "
+                    f"{found.encoding:.1f} s, cache {found.n_bytes / 1e6:.1f} MB{peak}"
+                )
 
 
 if __name__ == "__main__":
