@@ -20,13 +20,24 @@ TEMPLATE = """\
 """
 SPECIAL = ("<s>", "<|im_start|>", "<|im_end|>", "<pad>")
 # The second one's layers attend to windows, the third caps the scores, the fourth and the fifth
-# have positions of other kinds, the last one's layers have states instead of keys.
+# have positions of other kinds, the last two have layers with states instead of keys (Mamba's, and
+# linear attention's).
 SETTINGS = {
     "llama": {"head_dim": HEAD},
     "qwen2": {"use_sliding_window": True, "sliding_window": 12, "max_window_layers": 1},
     "gemma2": {"head_dim": HEAD, "attn_logit_softcapping": 0.1, "sliding_window": 12},
     "gpt_neox": {},
     "gpt2": {"n_layer": 2, "n_head": 4, "n_embd": 128, "n_positions": 2048},
+    "nemotron_h": {
+        "layers_block_type": ["linear_attention", "full_attention", "linear_attention", "mlp"],
+        "num_hidden_layers": 4,
+        "head_dim": HEAD,
+        "ssm_state_size": 8,
+        "mamba_num_heads": 8,
+        "mamba_head_dim": 32,
+        "n_groups": 2,
+        "chunk_size": 8,
+    },
     "qwen3_5_text": {
         "head_dim": HEAD,
         "layer_types": ["linear_attention", "full_attention"],
