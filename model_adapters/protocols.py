@@ -44,14 +44,12 @@ class CacheCut:
             chooses tokens.
         clues: numbers of those with evidence, of which the reply says how much was kept; no method
             is told them.
-        seed: seed of what the method draws.
     """
 
     method: str
     budget: int | None = None
     frames: tuple[int, ...] | None = None
     clues: tuple[int, ...] = ()
-    seed: int = 0
 
 
 @dataclass(frozen=True, kw_only=True)

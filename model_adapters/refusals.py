@@ -32,7 +32,7 @@ def check_decoding(name: str, capabilities: Capabilities, decoding: Decoding) ->
     if decoding.cache is not None and not capabilities.cache_cuts:
         raise ModelError(
             f"{name} has no cache that a memory can cut; use a memory of frames, or a model of "
-            "transformers with share_prefix=true"
+            "transformers with share_prefix=true and without attention"
         )
 
 

@@ -12,7 +12,7 @@ from infthor_eval.nieh.asking.baselines import Baseline
 from infthor_eval.nieh.asking.recalling import apply_recall, asks_model
 from infthor_eval.nieh.config import NiehConfig, NiehTaskConfig
 from infthor_eval.nieh.docs import doc_of, doc_target, prompt_of
-from infthor_eval.nieh.options import NiehOptions
+from infthor_eval.nieh.options import NONE, NiehOptions
 from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.nieh.samples import TaskSamples
 from infthor_eval.nieh.task import NiehTask, PreparedTask
@@ -257,6 +257,8 @@ def _refuse_incapable(subject: Subject, options: NiehOptions, tasks: Iterable[Ni
             )
     for task in tasks:
         check_decoding(f"{task.name}: {subject.name}", subject.capabilities, task.decoding)
+        if task.cuts_cache and options.frames == NONE:
+            raise UsageError("--frames none: a memory in the cache needs frames; leave it out")
         cut = CacheCut(method="") if task.cuts_cache else None
         check_decoding(subject.name, subject.capabilities, replace(task.decoding, cache=cut))
 

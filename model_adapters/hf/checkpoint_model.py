@@ -91,7 +91,7 @@ class HfModel(CheckpointModel):
             choices=True,
             image_input=self._prompter.takes_frames,
             video_input=self._prompter.takes_videos,
-            cache_cuts=self.cuts_caches,
+            cache_cuts=self.cuts_caches and self._options.attention is None,
             batch_size=self._batch_size,
             max_tokens=self._context_limit,
             max_tokens_before_extension=None

@@ -230,16 +230,20 @@ class HfOptions(Reading, Placement):
         ),
     ] = None
     positions: Annotated[
-        str,
+        str | None,
         Setting(
             help="With sinks, where those out of the window seem to be: as far as the window is "
-            "long, right before it in the cache, or where they are.",
+            f"long, right before it in the cache, or where they are; default: {POSITIONS[0]}.",
             choices=POSITIONS,
         ),
-    ] = POSITIONS[0]
+    ] = None
     attention_unit: Annotated[
-        str, Setting(help="What attention sees or does not see as a whole.", choices=UNITS)
-    ] = UNITS[0]
+        str | None,
+        Setting(
+            help=f"What attention sees or does not see as a whole; default: {UNITS[0]}.",
+            choices=UNITS,
+        ),
+    ] = None
     feature_cache_mb: Annotated[
         Count, Setting(help="Memory for vision features of earlier frames, in MiB.")
     ] = 128
@@ -265,19 +269,23 @@ class HfOptions(Reading, Placement):
     ] = None
 
     def __post_init__(self) -> None:
-        if self.attention is not None:
-            parse_attention(self.attention)
-            if not self.share_prefix:
-                raise ValueError("attention needs share_prefix=true")
+        shape = None if self.attention is None else parse_attention(self.attention)
+        if shape is not None and not self.share_prefix:
+            raise ValueError("attention needs share_prefix=true")
+        if self.positions is not None and not getattr(shape, "sinks", 0):
+            raise ValueError("positions needs attention=sinks:N+window:N; leave it out")
+        if self.attention_unit is not None and shape is None:
+            raise ValueError("attention_unit needs attention; leave it out")
         super().__post_init__()
 
     def attention_identity(self) -> dict[str, Any]:
         """Return what of sparse attention decides replies; nothing without it."""
         if self.attention is None:
             return {}
-        shape = parse_attention(self.attention)
-        positions = {"positions": self.positions} if getattr(shape, "sinks", 0) else {}
-        return {"attention": {"shape": self.attention, "unit": self.attention_unit, **positions}}
+        has_sinks = getattr(parse_attention(self.attention), "sinks", 0)
+        positions = {"positions": self.positions or POSITIONS[0]} if has_sinks else {}
+        unit = self.attention_unit or UNITS[0]
+        return {"attention": {"shape": self.attention, "unit": unit, **positions}}
 
     def chunk_size(self, device_type: str) -> int:
         """Return most tokens of one forward pass on a device, by torch's name of its type."""

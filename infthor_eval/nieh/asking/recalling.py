@@ -235,7 +235,6 @@ def apply_recall(
             budget=settings.budget,
             frames=tuple(frames) if cache == FRAMES else None,
             clues=clues,
-            seed=settings.seed,
         )
         return replace(sample, recalled=recall.recalled, cut=cut)
     return replace(sample, frames=(*frames, sample.frames[-1]), recalled=recall.recalled)

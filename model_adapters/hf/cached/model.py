@@ -30,7 +30,7 @@ from model_adapters.hf.sparse.chosen import ChosenAttention
 from model_adapters.hf.sparse.reading import SparseReading
 from model_adapters.hf.sparse.rotation import find_rotations
 from model_adapters.hf.sparse.window import WindowAttention
-from model_adapters.options.attention import AttentionShape, Window, parse_attention
+from model_adapters.options.attention import POSITIONS, AttentionShape, Window, parse_attention
 from model_adapters.options.checkpoints import HfOptions
 from model_adapters.protocols import CacheCut, Decoding, KeptCache, Reply, Turn
 
@@ -83,7 +83,7 @@ class TransformersModel(HfModel):
             )
         rule: WindowAttention | ChosenAttention
         if isinstance(shape, Window):
-            positions = options.positions if shape.sinks else "absolute"
+            positions = options.positions or (POSITIONS[0] if shape.sinks else "absolute")
             is_turned = positions != "absolute"
             rotations = find_rotations(self._loaded.model, self._embed) if is_turned else ()
             rule = WindowAttention(shape, positions, rotations)
@@ -238,7 +238,7 @@ class TransformersModel(HfModel):
         cached = self._prefix.n_tokens
         logits = self._prefix.feed(prompt[shared:], reserve=reply.decoding.max_new_tokens)
         decode_replies(
-            logits[None], lambda tokens: self._prefix.feed(list(tokens.values()))[None], [reply]
+            logits[None], lambda tokens: self._prefix.step(list(tokens.values()))[None], [reply]
         )
         return cached
 
@@ -247,10 +247,10 @@ class TransformersModel(HfModel):
     ) -> tuple[list[int], list[KeptCache | None]]:
         """Decode replies behind what is kept of the frames before the last one; return how many
         tokens of each prompt were encoded already, and what was kept."""
-        if self.windows is None or self.windows or self._prefix.sparse is not None:
+        if self.windows is None or self.windows:
             raise ModelError(
-                f"the cache of {self.name} cannot be cut, as not all layers see everything; use a "
-                "memory of frames"
+                f"the cache of {self.name} cannot be cut: not all layers see everything, or their "
+                "rotary frequencies depend on the length; use a memory of frames"
             )
         asks = method_of(cut).asks
         config = self._loaded.model.get_decoder().config
@@ -286,9 +286,8 @@ class TransformersModel(HfModel):
         """Decode replies together; return how many tokens of each prompt were in the cache."""
         most = max(n_shared)
         longest = prompts[n_shared.index(most)]
-        cached = min(self._prefix.rewind_to(longest), most)
         # The cached sequence may share more with that prompt than others do.
-        self._prefix.cut(cached)
+        cached = self._prefix.rewind_to([*longest[:most], 0])
         n_cached = self._prefix.n_tokens
         if cached < most:
             self._prefix.feed(longest[cached:most])

@@ -153,7 +153,8 @@ class Prefix:
             if ours != theirs or ours > shared:
                 break
             n_same = ours
-        return shared if n_same == len(shown) else n_same
+        is_asked = n_same == len(shown) and self._chunk_ends[-1:] in ([], [n_same])
+        return shared if is_asked else n_same
 
     def _set_rope(self, rope: LengthRope, pieces: Sequence[Piece]) -> None:
         """Set the rotary frequencies for a prompt; a sequence encoded with others is dropped."""
@@ -195,7 +196,8 @@ class Prefix:
         """
         self._embed.expect(pieces)
         logits = None
-        shown, asked = self._parts(pieces)
+        n_shown = max(0, len(self._parts([*self._pieces, *pieces])[0]) - self.n_pieces)
+        shown, asked = pieces[:n_shown], pieces[n_shown:]
         n_stored = self.n_tokens + n_tokens(shown)
         if self.sparse is not None:
             n_stored = self.sparse.most_stored(n_stored, self._chunk_tokens)
@@ -212,6 +214,10 @@ class Prefix:
         if logits is None:
             raise ValueError("nothing to feed")
         return logits
+
+    def step(self, tokens: Sequence[int]) -> torch.Tensor:
+        """Encode tokens of a reply; return the logits of the next one, (vocabulary,)."""
+        return self._forward(list(tokens), is_asked=True)
 
     def _parts(self, pieces: Sequence[Piece]) -> tuple[Sequence[Piece], Sequence[Piece]]:
         """Return pieces up to the last frame, behind which prompts on the same frames differ, and

@@ -4,6 +4,8 @@ import importlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from itertools import pairwise
+from statistics import fmean
 from typing import Any, NamedTuple
 
 import torch
@@ -92,11 +94,11 @@ class EncodedView:
     cache: BufferedCache
     begin: int
     n_tokens: int
+    n_frames: int
     budget: int
     frames: Tensor
     is_frame: Tensor
     chosen: Sequence[int] | None
-    seed: int
     attention: list[Tensor] = field(default_factory=list)
 
     @classmethod
@@ -105,19 +107,23 @@ class EncodedView:
     ) -> "EncodedView":
         """Return the view of the first pieces of a sequence, of which some are before frames."""
         begin = n_tokens(pieces[:n_opening])
-        widths = torch.tensor([n_tokens([piece]) for piece in pieces[n_opening:]])
-        is_frame = torch.tensor([not isinstance(piece, int) for piece in pieces[n_opening:]])
-        frames = (is_frame.cumsum(0) - 1).repeat_interleave(widths)
+        shown = pieces[n_opening:]
+        owners = _owners(shown)
+        widths = torch.tensor([n_tokens([piece]) for piece in shown], dtype=torch.long)
+        is_frame = torch.tensor([not isinstance(piece, int) for piece in shown], dtype=torch.bool)
+        frames = torch.tensor(owners, dtype=torch.long).repeat_interleave(widths)
+        layers = prefix.cache.layers
+        device = layers[0].keys.device if layers else frames.device
         n = len(frames)
         return cls(
             cache=prefix.cache,
             begin=begin,
             n_tokens=n,
+            n_frames=int(is_frame.sum()),
             budget=n if cut.budget is None else min(cut.budget, n),
-            frames=frames,
-            is_frame=is_frame.repeat_interleave(widths),
+            frames=frames.to(device),
+            is_frame=is_frame.repeat_interleave(widths).to(device),
             chosen=cut.frames,
-            seed=cut.seed,
         )
 
     def keys(self, layer: int) -> Tensor:
@@ -143,6 +149,16 @@ class EncodedView:
         return states
 
 
+def _owners(pieces: Sequence[Piece]) -> list[int]:
+    """Return the number of each piece's frame; of marks between two frames half are of either."""
+    places = [at for at, piece in enumerate(pieces) if not isinstance(piece, int)]
+    owners: list[int] = []
+    for number, (at, following) in enumerate(pairwise([*places, len(pieces)])):
+        n_own = 1 + -(-(following - at - 1) // 2)
+        owners += [number] * n_own + [number + 1] * (following - at - n_own)
+    return owners
+
+
 class CutPrefix:
     """What is kept of a sequence, in place of its `Prefix` for what follows.
 
@@ -163,27 +179,31 @@ class CutPrefix:
         shares = []
         counts = []
         n_bytes = 0
-        clues = torch.isin(view.frames, torch.tensor([*cut.clues])) & view.is_frame
-        for layer in range(config.num_hidden_layers):
-            places = method.keep(view, layer)
+        numbers = torch.tensor([*cut.clues], dtype=torch.long, device=view.frames.device)
+        clues = torch.isin(view.frames, numbers) & view.is_frame
+        n_clues = int(clues.sum())
+        for layer in range(config.num_hidden_layers if view.cache.layers else 0):
+            nothing = torch.empty(0, dtype=torch.long, device=view.frames.device)
+            places = method.keep(view, layer) if view.n_tokens else nothing
             n_counted = int(view.is_frame[places].sum(dim=-1).max()) if len(places) else 0
-            if n_counted > view.budget:
+            if n_counted > view.budget and not method.keeps_all:
                 raise ModelError(
                     f"the method {cut.method} keeps {n_counted} tokens of frames where the budget "
                     f"is {view.budget}"
                 )
-            pairs = zip(view.opening(layer), method.states(view, layer, places), strict=True)
+            kept = method.states(view, layer, places)
+            pairs = zip(view.opening(layer), kept, strict=True)
             keys, values = (torch.cat(pair, dim=1)[None] for pair in pairs)
             self.cache.update(keys, values, layer)
-            n_bytes += method.n_bytes(keys, values)
+            n_bytes += method.n_bytes(*kept)
             counts.append(places.shape[-1])
-            if cut.clues:
+            if n_clues:
                 n_found = clues[places].float().sum(dim=-1).mean()
-                shares.append(float(n_found / clues.sum()))
+                shares.append(float(n_found) / n_clues)
         self.kept = KeptCache(
-            tokens=sum(counts) / len(counts),
+            tokens=fmean(counts) if counts else 0,
             bytes=n_bytes,
-            clues=sum(shares) / len(shares) if shares else None,
+            clues=fmean(shares) if shares else None,
         )
 
     @property
@@ -212,9 +232,15 @@ class CutPrefix:
 
 @torch.inference_mode()
 def attention_of(prefix: Prefix, config: Any, pieces: Sequence[Piece]) -> list[Tensor]:
-    """Return how much pieces attend to a sequence before them, by layer: (key heads, tokens).
+    """Return how much pieces behind a frame attend to a sequence before it, by layer: (key heads,
+    tokens), the mean of pieces and of heads that share a key head.
 
     The sequence is as it was afterwards.
+
+    Args:
+        prefix: the sequence.
+        config: config of the decoder.
+        pieces: the frame, and what is asked behind it.
     """
     n_before = prefix.n_tokens
     n_pieces = prefix.n_pieces
@@ -229,11 +255,12 @@ def attention_of(prefix: Prefix, config: Any, pieces: Sequence[Piece]) -> list[T
         places = torch.arange(key.shape[2], device=key.device)
         later = places > places[-n_new:, None]
         weights = scores.masked_fill(later, -torch.inf).softmax(dim=-1)
-        found[module.layer_idx].append(weights[..., :n_before].mean(dim=1).sum(dim=1))
+        found[module.layer_idx].append(weights[..., :n_before].mean(dim=1))
         return dense(module, query, key, *others, **options)
 
     mask = AttentionMaskInterface._global_mapping["sdpa"]
     with attending(config, f"watched_{id(found)}", attention, mask):
         prefix.feed(pieces)
     prefix.cut(n_pieces)
-    return [torch.stack(parts).sum(dim=0) for parts in found]
+    n_frame = n_tokens(pieces[:1])
+    return [torch.cat(parts, dim=1)[:, n_frame:].mean(dim=1) for parts in found]

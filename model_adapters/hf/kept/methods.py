@@ -21,17 +21,18 @@ class CacheView(Protocol):
 
     Attributes:
         n_tokens: its tokens.
+        n_frames: its frames.
         budget: most tokens of frames that are kept for each head.
-        frames: number of each token's frame, (tokens,); of a text that of the frame before it.
+        frames: number of each token's frame, (tokens,); of marks that of the frame that they begin
+            or end, which may be the last one's.
         chosen: numbers of the frames that are kept, if these were chosen; None if not.
-        seed: seed of what is drawn.
     """
 
     n_tokens: int
+    n_frames: int
     budget: int
     frames: Tensor
     chosen: Sequence[int] | None
-    seed: int
 
     def keys(self, layer: int) -> Tensor:
         """Return a layer's keys, turned to their positions: (key heads, tokens, head size)."""
@@ -49,9 +50,11 @@ class CacheMethod:
 
     Attributes:
         asks: True if it goes by the question, for which everything was kept until then.
+        keeps_all: True if no budget holds for it.
     """
 
     asks: ClassVar[bool] = False
+    keeps_all: ClassVar[bool] = False
 
     def n_bytes(self, keys: Tensor, values: Tensor) -> int:
         """Return the bytes that these take where they are stored."""
@@ -67,11 +70,11 @@ class CacheMethod:
 
 
 class Frames(CacheMethod):
-    """The tokens of chosen frames."""
+    """The tokens of chosen frames, and the mark that begins the last one."""
 
     def keep(self, view: CacheView, layer: int) -> Tensor:
         """See `CacheMethod`."""
-        chosen = torch.tensor([*(view.chosen or ())], device=view.frames.device)
+        chosen = torch.tensor([*(view.chosen or ()), view.n_frames], device=view.frames.device)
         return torch.isin(view.frames, chosen).nonzero()[:, 0]
 
 
@@ -119,6 +122,8 @@ class Merge(CacheMethod):
     def states(self, view: CacheView, layer: int, places: Tensor) -> tuple[Tensor, Tensor]:
         """See `CacheMethod`."""
         keys, values = view.keys(layer), view.values(layer)
+        if not len(places):  # a budget of nothing
+            return super().states(view, layer, places)
         unit = normalize(keys.float(), dim=-1)
         nearest = (unit @ unit[:, places].transpose(-1, -2)).argmax(dim=-1)  # (heads, tokens)
         nearest[:, places] = torch.arange(len(places), device=places.device)
@@ -127,6 +132,8 @@ class Merge(CacheMethod):
 
 class EightBits(CacheMethod):
     """Everything, rounded to 8 bits by token and head."""
+
+    keeps_all = True
 
     def keep(self, view: CacheView, layer: int) -> Tensor:
         """See `CacheMethod`."""

@@ -90,8 +90,9 @@ def load_shapes(options: CheckpointOptions) -> RehearsedModel:
 
 
 def _refuse_options(options: CheckpointOptions) -> None:
-    if options.kv_offload or options.quantization:
-        name = "kv_offload" if options.kv_offload else "quantization"
+    for name in ("kv_offload", "quantization", "attention"):
+        if not getattr(options, name):
+            continue
         raise UsageError(
             f"{name} cannot be rehearsed: memory would be counted wrongly; leave it out"
         )

@@ -18,7 +18,6 @@ class View:
 
     n_tokens: int
     budget: int
-    seed: int = 0
     chosen: tuple[int, ...] | None = None
     frames: torch.Tensor = field(init=False)
 
@@ -26,6 +25,10 @@ class View:
         draw = torch.Generator().manual_seed(self.n_tokens)
         self.states = torch.randn(3, HEADS, self.n_tokens, SIZE, generator=draw)
         self.frames = torch.arange(self.n_tokens) // 3
+
+    @property
+    def n_frames(self):
+        return self.n_tokens // 3
 
     def keys(self, _layer):
         return self.states[0]

@@ -5,6 +5,7 @@ import torch
 
 from infthor_eval.errors import ModelError
 from model_adapters import CacheCut, load
+from model_adapters.hf.kept.cutting import _owners, split_at_last_frame
 from model_adapters.hf.kept.methods import CacheMethod
 
 from ....helpers.refusals import read_one_line
@@ -131,3 +132,42 @@ def test_models_without_such_a_cache_refuse(options, frames):
     with pytest.raises(ModelError, match="cache") as raised:
         _replies(model, frames, _cut("Norm", budget=9))
     read_one_line(raised)
+
+
+@pytest.mark.parametrize("method", [*ALL, "EightBits"])
+def test_of_the_current_view_alone_nothing_is_cut(method, model, frames):
+    cut = _cut(method, frames=() if method == "Frames" else None, budget=9, clues=(0,))
+    replies = _replies(model, frames[:1], cut)
+    assert _ids(replies) == _ids(_replies(model, frames[:1]))
+    assert replies[0].kept.tokens == 0
+    assert replies[0].kept.clues is None  # the only clue is in view
+
+
+def test_eight_bits_are_kept_of_everything_whatever_the_budget_is(model, frames):
+    whole = _replies(model, frames, _cut("Norm"))[0].kept
+    kept = _replies(model, frames, _cut("EightBits", budget=9))[0].kept
+    assert kept.tokens == whole.tokens
+    assert kept.bytes < 0.32 * whole.bytes
+
+
+def test_frames_are_kept_with_the_marks_around_them(model, frames):
+    pieces = model.pieces(user(*frames, "What?"))
+    opening, last = split_at_last_frame(pieces)
+    owners = _owners(pieces[opening:last])
+    begins, ends = (
+        model.loaded.tokenizer.convert_tokens_to_ids(f"<|vision_{name}|>")
+        for name in ("start", "end")
+    )
+    number = 0
+    for piece, owner in zip(pieces[opening:last], owners, strict=True):
+        if isinstance(piece, int):
+            assert owner == (number - 1 if piece == ends else number)
+            assert piece in (begins, ends)
+        else:
+            assert owner == number
+            number += 1
+
+
+def test_a_budget_of_nothing_keeps_nothing(model, frames):
+    for method in ("Sinks", "Norm", "Question", "Merge"):
+        assert _replies(model, frames, _cut(method, budget=0))[0].kept.tokens == 0

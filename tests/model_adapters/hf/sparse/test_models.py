@@ -7,7 +7,7 @@ from model_adapters import load
 from model_adapters.hf.sparse import chosen
 
 from ....helpers.refusals import read_one_line
-from ...asking import load_saved, talk_of, up_to, user
+from ...asking import load_saved, load_with, talk_of, up_to, user
 
 WHOLE = ("window:90000", "sinks:8+window:90000", "vertical-slash:1", "block-sparse:9000")
 SHAPES = ("sinks:4+window:30", "window:25", "vertical-slash:.2", "block-sparse:1")
@@ -36,7 +36,7 @@ def sparse(checkpoints):
     def get(family="qwen2.5-vl", **options):
         key = (family, *sorted(options.items()))
         if key not in loaded:
-            loaded[key] = load_saved(family, checkpoints[family], **SMALL, **options)
+            loaded[key] = load_saved(family, checkpoints[family], **{**SMALL, **options})
         return loaded[key]
 
     yield get
@@ -64,7 +64,8 @@ def _ask_all(model, frames, *, new=8):
 def test_what_sees_the_whole_context_replies_as_dense_attention(
     family, attention, positions, sparse, frames
 ):
-    ours = sparse(family, attention=attention, positions=positions)
+    turned = {"positions": positions} if attention.startswith("sinks") else {}
+    ours = sparse(family, attention=attention, **turned)
     assert _ask_all(ours, frames) == _ask_all(sparse(family), frames)
 
 
@@ -187,3 +188,57 @@ def test_positions_that_are_learned_can_stay_as_they_are(language_models):
     model = load_saved("hf-lm", language_models / "gpt2", **options, positions="absolute")
     dense = load_saved("hf-lm", language_models / "gpt2", **SMALL)
     assert _ask_all(model, [WAY] * 5) != _ask_all(dense, [WAY] * 5)
+
+
+@pytest.mark.parametrize("attention", SHAPES[:2])
+@pytest.mark.parametrize("chunk", [10, 24])
+def test_a_batch_of_texts_goes_back_no_further_than_is_stored(attention, chunk, language_models):
+    options = {**SMALL, "chunk_tokens": chunk, "attention": attention, "batch_size": 4}
+    model = load_saved("hf-lm", language_models / "llama", **options)
+    asked = [user(WAY * 2 + words) for words in ("It is long. Where?", "What is it then?")]
+    fresh = []
+    for turns in asked:
+        model.forget()
+        fresh.append(model.answer(turns, up_to(6)).token_ids)
+    model.answer(asked[0], up_to(6))
+    together = model.answer_each(asked, up_to(6))
+    assert [reply.token_ids for reply in together] == fresh
+
+
+CHOSEN = SHAPES[2:]
+
+
+@pytest.mark.parametrize("attention", CHOSEN)
+def test_what_is_asked_is_read_densely_however_long_it_is(attention, sparse, frames):
+    model = sparse(attention=attention)
+    long = WAY * 4 + "Where?"
+    model.forget()
+    fresh = talk_of(model, user(*frames, long)).reply(up_to(6)).token_ids
+    model.forget()
+    talk_of(model, user(*frames, "What?")).reply(up_to(2))
+    assert talk_of(model, user(*frames, long)).reply(up_to(6)).token_ids == fresh
+
+
+@pytest.mark.parametrize("attention", CHOSEN)
+def test_what_was_read_before_a_frame_is_read_again_where_it_is_asked(attention, sparse, frames):
+    model = sparse(attention=attention, chunk_tokens=100)
+    for before in ((), frames[:3]):
+        asked = user(*before, WAY, "Where?")
+        model.forget()
+        fresh = talk_of(model, asked).reply(up_to(6)).token_ids
+        model.forget()
+        talk_of(model, user(*before, WAY, frames[4], "What?")).reply(up_to(2))
+        assert talk_of(model, asked).reply(up_to(6)).token_ids == fresh
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"positions": "cache"}, "positions needs attention=sinks:N\\+window:N"),
+        ({"positions": "cache", "attention": "window:9"}, "positions needs attention=sinks"),
+        ({"attention_unit": "frames"}, "attention_unit needs attention; leave it out"),
+    ],
+)
+def test_options_without_effect_are_refused(options, message, checkpoints):
+    with pytest.raises(UsageError, match=message):
+        load_with("qwen2.5-vl", pretrained=checkpoints["qwen2.5-vl"], **options)
