@@ -3,20 +3,13 @@
 The frames before the current view are encoded, their keys and values are cut to the budget, and the
 question is asked behind what is left (`model_adapters.hf.kept`). Memories of frames choose as those
 that show frames do, so that both can be compared: cut after the whole was encoded, or encoded
-alone.
+alone. Of the others the method chooses tokens, so that no frame is recalled as a whole.
 """
 
-from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import ClassVar
 
-from infthor_eval.memory.frames import Last, Oracle, Random, Uniform
-from infthor_eval.memory.protocol import (
-    MemoryCapabilities,
-    Observation,
-    Query,
-    Recalled,
-    TrajectoryFacts,
-)
+from infthor_eval.memory.frames import Last, Nothing, Oracle, Random, Uniform
+from infthor_eval.memory.protocol import MemoryCapabilities
 
 _METHODS = "model_adapters.hf.kept.methods"
 FRAMES = f"{_METHODS}:Frames"  # keeps the frames that the memory recalls
@@ -46,51 +39,33 @@ class KvOracle(Oracle):
     capabilities: ClassVar[MemoryCapabilities] = MemoryCapabilities(privileged=True, cache=FRAMES)
 
 
-class _KvTokens:
-    """Base of memories whose method chooses tokens: no frame is recalled as a whole."""
-
-    capabilities: ClassVar[MemoryCapabilities]
-
-    def identity(self) -> Mapping[str, Any]:
-        """See `Memory`."""
-        return {}
-
-    def begin(self, facts: TrajectoryFacts) -> None:
-        """See `Memory`."""
-
-    def observe(self, observation: Observation) -> None:
-        """See `Memory`."""
-
-    def recall(self, query: Query, budget: int | None) -> Recalled:
-        """See `Memory`."""
-        return []
-
-
-class KvSinks(_KvTokens):
+class KvSinks(Nothing):
     """Keys and values of the first four tokens and the last ones (StreamingLLM)."""
 
-    capabilities = MemoryCapabilities(cache=f"{_METHODS}:Sinks")
+    capabilities: ClassVar[MemoryCapabilities] = MemoryCapabilities(cache=f"{_METHODS}:Sinks")
 
 
-class KvNorm(_KvTokens):
+class KvNorm(Nothing):
     """Keys of the smallest norms, by head, with their values."""
 
-    capabilities = MemoryCapabilities(cache=f"{_METHODS}:Norm")
+    capabilities: ClassVar[MemoryCapabilities] = MemoryCapabilities(cache=f"{_METHODS}:Norm")
 
 
-class KvQuestion(_KvTokens):
+class KvQuestion(Nothing):
     """What the question attends to, by head (SnapKV); everything was kept until it was asked."""
 
-    capabilities = MemoryCapabilities(privileged=True, cache=f"{_METHODS}:Question")
+    capabilities: ClassVar[MemoryCapabilities] = MemoryCapabilities(
+        privileged=True, cache=f"{_METHODS}:Question"
+    )
 
 
-class KvMerge(_KvTokens):
+class KvMerge(Nothing):
     """Tokens at even distances, each averaged with those whose keys are most like its own."""
 
-    capabilities = MemoryCapabilities(cache=f"{_METHODS}:Merge")
+    capabilities: ClassVar[MemoryCapabilities] = MemoryCapabilities(cache=f"{_METHODS}:Merge")
 
 
-class KvEightBits(_KvTokens):
+class KvEightBits(Nothing):
     """Everything in 8 bits, whatever the budget is."""
 
-    capabilities = MemoryCapabilities(cache=f"{_METHODS}:EightBits")
+    capabilities: ClassVar[MemoryCapabilities] = MemoryCapabilities(cache=f"{_METHODS}:EightBits")

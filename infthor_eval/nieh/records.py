@@ -107,19 +107,6 @@ class NiehRecall(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", ta
         return sum(isinstance(position, int) for position in self.recalled)
 
 
-class KeptTokens(msgspec.Struct, frozen=True, kw_only=True):
-    """What was kept of the model's cache; see `KeptCache`."""
-
-    tokens: Amount
-    bytes: Count
-    clues: Amount | None = None
-
-    @classmethod
-    def of(cls, kept: KeptCache) -> "KeptTokens":
-        """Return what a model said of its cache."""
-        return cls(tokens=kept.tokens, bytes=kept.bytes, clues=kept.clues)
-
-
 class NiehAnswer(Typed, frozen=True, kw_only=True, tag="nieh_answer"):
     """A question and the reply to it.
 
@@ -165,7 +152,7 @@ class NiehAnswer(Typed, frozen=True, kw_only=True, tag="nieh_answer"):
     n_watched: Count | None = None
     reply_ids: tuple[Count, ...] = ()
     margins: tuple[Amount, ...] = ()
-    kept: KeptTokens | None = None
+    kept: KeptCache | None = None
 
     @classmethod
     def of(

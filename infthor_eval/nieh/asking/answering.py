@@ -19,7 +19,7 @@ from infthor_eval.nieh.asking.budget import budget_of
 from infthor_eval.nieh.asking.notebook import Notebook
 from infthor_eval.nieh.asking.recalling import Recaller, apply_recall
 from infthor_eval.nieh.contexts.video import as_images
-from infthor_eval.nieh.records import KeptTokens, NiehAnswer, NiehRecall
+from infthor_eval.nieh.records import NiehAnswer, NiehRecall
 from infthor_eval.nieh.samples import TaskSamples
 from infthor_eval.nieh.task import PreparedTask
 from infthor_eval.nieh.twins import first_world, twin_side
@@ -81,8 +81,7 @@ class NiehRequest(Request[NiehAnswer]):
     def replied(self, reply: Reply, answer: str, thinking: str | None) -> NiehAnswer:
         """See `Request`."""
         payload = self.unit.payload.with_reply(answer, {}, thinking)
-        kept = None if reply.kept is None else KeptTokens.of(reply.kept)
-        payload = replace_fields(payload, n_watched=reply.n_watched, kept=kept)
+        payload = replace_fields(payload, n_watched=reply.n_watched, kept=reply.kept)
         if reply.margins is None:
             return payload
         margins = tuple(round(margin, _MARGIN_DIGITS) for margin in reply.margins)

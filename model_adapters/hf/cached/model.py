@@ -15,12 +15,12 @@ from model_adapters.hf.checkpoint_model import HfModel
 from model_adapters.hf.global_settings import torch_threads
 from model_adapters.hf.kept.cutting import (
     CutPrefix,
-    EncodedView,
     attention_of,
     grouped,
     method_of,
 )
 from model_adapters.hf.kept.store import PrefixStore
+from model_adapters.hf.kept.view import CacheView
 from model_adapters.hf.limits import check_limit, wrap_memory_errors, wrap_model_errors
 from model_adapters.hf.loading.loaded import LoadedCheckpoint
 from model_adapters.hf.loading.rope import take_length_rope
@@ -206,23 +206,16 @@ class TransformersModel(HfModel):
         if len(prompts) == 1:
             return []
         shared = n_nested(prompts)
-        if self._prefix.sparse is not None:
-            return self._n_read_alike(prompts, shared)
+        sparse = self._prefix.sparse
+        if sparse is not None:
+            # Beginnings of what is read are dropped, or were read by what comes later; so is a text
+            # by the chunk that it shares with what is asked.
+            is_text = all(isinstance(piece, int) for piece in prompts[0])
+            is_alike = len(set(shared)) == 1 and not (sparse.goes_by_chunks and is_text)
+            return shared if is_alike else []
         if not shared and not self._embed.sees_ahead:
             shared = [n_common(prompts)] * len(prompts)
         return shared
-
-    def _n_read_alike(self, prompts: Sequence[Sequence[Piece]], shared: list[int]) -> list[int]:
-        """Return how many pieces of prompts are read sparsely as they are of each alone, of so many
-        that they share; nothing where not.
-
-        Beginnings of what is read are dropped, or were read by what comes later; so is a text by
-        the chunk that it shares with what is asked.
-        """
-        sparse = self._prefix.sparse
-        is_text = all(isinstance(piece, int) for piece in prompts[0])
-        by_chunks = sparse is not None and sparse.goes_by_chunks and is_text
-        return shared if len(set(shared)) == 1 and not by_chunks else []
 
     def _decode_each(
         self, prompts: Sequence[Sequence[Piece]], replies: Sequence[ReplyState]
@@ -258,7 +251,7 @@ class TransformersModel(HfModel):
         kept: list[KeptCache | None] = []
         for group in grouped(prompts, together=not asks):
             prefix, n_known = self._encoded.encode(group.before, exactly=asks)
-            view = EncodedView.of(prefix, group.before, group.n_opening, cut)
+            view = CacheView.of(prefix, group.before, group.n_opening, cut)
             if asks:
                 view.attention = attention_of(prefix, config, group.afters[0])
             n_before = len(group.before)

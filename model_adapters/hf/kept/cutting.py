@@ -3,8 +3,6 @@
 import importlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
-from itertools import pairwise
 from statistics import fmean
 from typing import Any, NamedTuple
 
@@ -14,9 +12,10 @@ from transformers.masking_utils import AttentionMaskInterface
 from transformers.modeling_utils import ALL_ATTENTION_FUNCTIONS
 
 from infthor_eval.errors import ModelError
-from model_adapters.hf.cached.kv_cache import BufferedCache, BufferedLayer
+from model_adapters.hf.cached.kv_cache import BufferedCache
 from model_adapters.hf.cached.prefix import Prefix
 from model_adapters.hf.kept.methods import CacheMethod
+from model_adapters.hf.kept.view import CacheView
 from model_adapters.hf.prompting.prompt import Piece, n_tokens
 from model_adapters.hf.sparse.interface import attending
 from model_adapters.protocols import CacheCut, KeptCache
@@ -79,86 +78,6 @@ def grouped(prompts: Sequence[Sequence[Piece]], *, together: bool) -> Iterator[B
         yield group
 
 
-@dataclass
-class EncodedView:
-    """Tokens of a sequence from the first frame on; see `CacheView`.
-
-    Attributes:
-        cache: keys and values of the sequence.
-        begin: tokens before the first frame, which are kept in any case.
-        n_tokens: tokens behind these.
-        is_frame: which of them are a frame's own, and not text behind it, (tokens,).
-        attention: how much a question attends to each token, by layer.
-    """
-
-    cache: BufferedCache
-    begin: int
-    n_tokens: int
-    n_frames: int
-    budget: int
-    frames: Tensor
-    is_frame: Tensor
-    chosen: Sequence[int] | None
-    attention: list[Tensor] = field(default_factory=list)
-
-    @classmethod
-    def of(
-        cls, prefix: Prefix, pieces: Sequence[Piece], n_opening: int, cut: CacheCut
-    ) -> "EncodedView":
-        """Return the view of the first pieces of a sequence, of which some are before frames."""
-        begin = n_tokens(pieces[:n_opening])
-        shown = pieces[n_opening:]
-        owners = _owners(shown)
-        widths = torch.tensor([n_tokens([piece]) for piece in shown], dtype=torch.long)
-        is_frame = torch.tensor([not isinstance(piece, int) for piece in shown], dtype=torch.bool)
-        frames = torch.tensor(owners, dtype=torch.long).repeat_interleave(widths)
-        layers = prefix.cache.layers
-        device = layers[0].keys.device if layers else frames.device
-        n = len(frames)
-        return cls(
-            cache=prefix.cache,
-            begin=begin,
-            n_tokens=n,
-            n_frames=int(is_frame.sum()),
-            budget=n if cut.budget is None else min(cut.budget, n),
-            frames=frames.to(device),
-            is_frame=is_frame.repeat_interleave(widths).to(device),
-            chosen=cut.frames,
-        )
-
-    def keys(self, layer: int) -> Tensor:
-        """See `CacheView`."""
-        return self._states(layer).keys[0, :, self.begin : self.begin + self.n_tokens]
-
-    def values(self, layer: int) -> Tensor:
-        """See `CacheView`."""
-        return self._states(layer).values[0, :, self.begin : self.begin + self.n_tokens]
-
-    def asked(self, layer: int) -> Tensor:
-        """See `CacheView`."""
-        return self.attention[layer][:, self.begin : self.begin + self.n_tokens]
-
-    def opening(self, layer: int) -> tuple[Tensor, Tensor]:
-        """Return keys and values of what is before the first frame."""
-        states = self._states(layer)
-        return states.keys[0, :, : self.begin], states.values[0, :, : self.begin]
-
-    def _states(self, layer: int) -> BufferedLayer:
-        states = self.cache.layers[layer]
-        assert isinstance(states, BufferedLayer)
-        return states
-
-
-def _owners(pieces: Sequence[Piece]) -> list[int]:
-    """Return the number of each piece's frame; of marks between two frames half are of either."""
-    places = [at for at, piece in enumerate(pieces) if not isinstance(piece, int)]
-    owners: list[int] = []
-    for number, (at, following) in enumerate(pairwise([*places, len(pieces)])):
-        n_own = 1 + -(-(following - at - 1) // 2)
-        owners += [number] * n_own + [number + 1] * (following - at - n_own)
-    return owners
-
-
 class CutPrefix:
     """What is kept of a sequence, in place of its `Prefix` for what follows.
 
@@ -171,7 +90,7 @@ class CutPrefix:
     sparse = None
 
     @torch.inference_mode()
-    def __init__(self, config: Any, view: EncodedView, cut: CacheCut, end: int) -> None:
+    def __init__(self, config: Any, view: CacheView, cut: CacheCut, end: int) -> None:
         """Cut what a view shows; `end` is the position of the next token."""
         method = method_of(cut)
         self.cache = BufferedCache(config)

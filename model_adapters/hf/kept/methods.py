@@ -4,45 +4,17 @@ Positions of kept tokens stay those that they had. To add a method: a class here
 memory of it (`infthor_eval/memory/caches.py`); one of another package is named MODULE:CLASS.
 """
 
-from collections.abc import Sequence
-from typing import ClassVar, Protocol
+from typing import ClassVar
 
 import torch
 from torch import Tensor
 from torch.nn.functional import avg_pool1d, normalize
 
+from model_adapters.hf.kept.view import CacheView
+
 _SINKS = 4  # first tokens that StreamingLLM keeps
 _POOLED = 5  # neighbours whose scores are averaged, as in SnapKV
 _LEVELS = 127  # of 8 bits, on either side of 0
-
-
-class CacheView(Protocol):
-    """The cache of the frames before the last one, as a method sees it.
-
-    Attributes:
-        n_tokens: its tokens.
-        n_frames: its frames.
-        budget: most tokens of frames that are kept for each head.
-        frames: number of each token's frame, (tokens,); of marks that of the frame that they begin
-            or end, which may be the last one's.
-        chosen: numbers of the frames that are kept, if these were chosen; None if not.
-    """
-
-    n_tokens: int
-    n_frames: int
-    budget: int
-    frames: Tensor
-    chosen: Sequence[int] | None
-
-    def keys(self, layer: int) -> Tensor:
-        """Return a layer's keys, turned to their positions: (key heads, tokens, head size)."""
-
-    def values(self, layer: int) -> Tensor:
-        """Return a layer's values, likewise."""
-
-    def asked(self, layer: int) -> Tensor:
-        """Return how much the question attends to each token, the mean of its tokens and of the
-        heads that share a key head: (key heads, tokens). For methods that say `asks`."""
 
 
 class CacheMethod:

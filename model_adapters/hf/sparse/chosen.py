@@ -3,7 +3,6 @@ arXiv:2407.02490)."""
 
 from collections.abc import Iterator
 from functools import partial
-from typing import Protocol
 
 import torch
 from torch import Tensor
@@ -18,18 +17,6 @@ _BLOCK = 64  # queries that are computed together, keys of a block, and distance
 _LAST = 64  # queries at the end of a chunk, by which columns and bands are chosen
 # Chosen in any case, as published: 30 columns, and 100 distances or more.
 _FIRST_COLUMNS, _NEAR_BANDS = 30, 2
-
-
-class Choice(Protocol):
-    """What heads chose for the queries of a chunk."""
-
-    def keys(self, at: int, end: int) -> tuple[Tensor, Tensor]:
-        """Return what the queries from `at` to `end` see.
-
-        Returns:
-            Places of stored tokens, (heads, places), some of which stand for nothing, and which of
-            them each query sees, as a mask that spreads to (heads, queries, places).
-        """
 
 
 class ChosenAttention:
@@ -59,7 +46,7 @@ class ChosenAttention:
         rows = columns[len(columns) - n :]
         if n <= _LAST:
             return attend(query, Keys(key, value, seen(rows.number, columns.number)), scale)
-        choice: Choice
+        choice: _Lines | _Blocks
         if isinstance(self._shape, VerticalSlash):
             last = rows[n - _LAST :]
             is_seen = seen(last.number, columns.number)
@@ -116,7 +103,12 @@ class _Lines:
         self._is_column.scatter_(-1, self._columns, True)
 
     def keys(self, at: int, end: int) -> tuple[Tensor, Tensor]:
-        """See `Choice`."""
+        """Return what the queries from `at` to `end` see.
+
+        Returns:
+            Places of stored tokens, (heads, places), some of which stand for nothing, and which of
+            them each query sees, as a mask that spreads to (heads, queries, places).
+        """
         rows = torch.arange(at, end, device=self._bands.device) + self._before
         # A band of 64 distances, of 64 queries, is over 127 keys.
         offset = torch.arange(1 - _BLOCK, len(rows), device=rows.device)
@@ -150,7 +142,7 @@ class _Blocks:
             self._chosen.append(_largest(scores[:, : last + 1], n_chosen))
 
     def keys(self, at: int, end: int) -> tuple[Tensor, Tensor]:
-        """See `Choice`."""
+        """See `_Lines.keys`."""
         chosen = self._chosen[at // _BLOCK]
         widths = self._widths[chosen]
         offset = torch.arange(int(widths.max()), device=chosen.device)

@@ -5,8 +5,9 @@ import torch
 
 from infthor_eval.errors import ModelError
 from model_adapters import CacheCut, load
-from model_adapters.hf.kept.cutting import _owners, split_at_last_frame
+from model_adapters.hf.kept.cutting import split_at_last_frame
 from model_adapters.hf.kept.methods import CacheMethod
+from model_adapters.hf.kept.view import owners_of
 
 from ....helpers.refusals import read_one_line
 from ...asking import load_saved, talk_of, up_to, user
@@ -153,7 +154,7 @@ def test_eight_bits_are_kept_of_everything_whatever_the_budget_is(model, frames)
 def test_frames_are_kept_with_the_marks_around_them(model, frames):
     pieces = model.pieces(user(*frames, "What?"))
     opening, last = split_at_last_frame(pieces)
-    owners = _owners(pieces[opening:last])
+    owners = owners_of(pieces[opening:last])
     begins, ends = (
         model.loaded.tokenizer.convert_tokens_to_ids(f"<|vision_{name}|>")
         for name in ("start", "end")
