@@ -37,7 +37,7 @@ class KeptMeans(msgspec.Struct, frozen=True):
         )
 
 
-class MemorySummary(msgspec.Struct, frozen=True):
+class MemorySummary(msgspec.Struct, frozen=True, omit_defaults=True):
     """A task's memory, and what it recalled for a question on average.
 
     Attributes:
