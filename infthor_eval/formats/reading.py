@@ -85,7 +85,11 @@ def read_json(path: SetPath, hint: str) -> Any: ...
 def read_json(path: SetPath, hint: str, data_type: type[T]) -> T: ...
 def read_json(path: SetPath, hint: str, data_type: Any = Any) -> Any:
     """Return the content of a JSON file as the type that `msgspec` decodes it to."""
-    content = read_bytes(path, hint)
+    return decode_json(read_bytes(path, hint), path, hint, data_type)
+
+
+def decode_json(content: bytes, path: SetPath, hint: str, data_type: Any = Any) -> Any:
+    """Return the content of a JSON file that was read; see `read_json`."""
     expected = "valid JSON" if data_type is Any else "in its documented form"
     with wrap_errors(f"{path}: not {expected}", hint, catch=NOT_JSON):
         return msgspec.json.decode(content, type=data_type)

@@ -20,7 +20,7 @@ import msgspec
 from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import find_images
 from infthor_eval.formats.packed.paths import SetPath
-from infthor_eval.formats.reading import NOT_JSON, read_bytes, read_json
+from infthor_eval.formats.reading import NOT_JSON, decode_json, read_bytes, read_json
 
 LOG = "metadata.json"
 _HINT = "replay the trajectory again or restore the published file"
@@ -172,9 +172,10 @@ def read_steps(folder: SetPath) -> list[Step]:
     images = _unlogged_images(folder)
     if images:
         return [Step(index, image.name) for index, image in enumerate(images)]
+    content = read_bytes(path, _HINT)
     with suppress(*NOT_JSON):  # else it is of another layout, or broken
-        return _STEPS.decode(read_bytes(path, _HINT))
-    document = read_json(path, _HINT)
+        return _STEPS.decode(content)
+    document = decode_json(content, path, _HINT)
     return [_step(path, index, entry) for index, entry in enumerate(_entries(path, document))]
 
 

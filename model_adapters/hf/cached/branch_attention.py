@@ -13,7 +13,6 @@ from typing import Any
 
 import torch
 from torch import Tensor
-from torch.nn.functional import scaled_dot_product_attention
 
 from model_adapters.hf.cached.kv_cache import BufferedCache, cache_arguments
 from model_adapters.hf.prompting.embedding import Span
@@ -22,7 +21,9 @@ from model_adapters.hf.sparse.interface import (
     MaskFunction,
     attending,
     require_plain,
+    seen_by,
 )
+from model_adapters.hf.sparse.kernel import Keys, attend
 from model_adapters.hf.sparse.layout import Layout
 from model_adapters.hf.sparse.reading import SparseReading
 
@@ -194,13 +195,9 @@ class BranchAttention:
                 scaling,
             )
             return output.flatten(0, 1).transpose(0, 1)[None], None
-        output = scaled_dot_product_attention(
-            query.unflatten(1, shared)[0],
-            key[0, :, None].expand(-1, shared[1], -1, -1),
-            value[0, :, None].expand(-1, shared[1], -1, -1),
-            attn_mask=mask[0, 0].to(query.device),  # a model can be on several devices
-            scale=scaling,
-        )
+        seen = mask[0, 0].to(query.device)  # a model can be on several devices
+        among = Keys(key[0, :, None], value[0, :, None], seen)
+        output = attend(query.unflatten(1, shared)[0], among, scaling)
         return output.flatten(0, 1).transpose(0, 1)[None], None
 
     def _mask(
@@ -227,15 +224,8 @@ class BranchAttention:
             raise CannotAttendError("the model adds rules of its own to masks; set batch_size=1")
         if local_size is not None:
             self.windows.add(local_size)
-        first = self._positions.new_zeros(1, 1, 1, 1)  # the only batch, and any head
-        seen = mask_function(
-            first,
-            first,
-            self._positions[-self._n_new :][None, None, :, None],
-            self._positions[None, None, None],
-        )
-        if seen.shape[-2:] != (self._n_new, len(self._positions)):  # it goes by one of both
-            seen = seen.expand(1, 1, self._n_new, len(self._positions)).clone()
+        new_ones = self._positions[-self._n_new :]
+        seen = seen_by(mask_function, new_ones, self._positions).contiguous()[None, None]
         # In place, because a copy for every token would be as long as the context.
         new = self._branches[-self._n_new :, None]
         seen[..., self._n_prefix :] &= self._branches == new

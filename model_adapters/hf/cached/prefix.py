@@ -18,7 +18,7 @@ from model_adapters.hf.cached.kv_cache import BufferedCache, cache_arguments
 from model_adapters.hf.family import Family
 from model_adapters.hf.loading.rope import LengthRope
 from model_adapters.hf.prompting.embedding import Embed
-from model_adapters.hf.prompting.prompt import Piece, n_tokens, token_ids
+from model_adapters.hf.prompting.prompt import Piece, end_of_frames, n_tokens, token_ids
 from model_adapters.hf.sparse.reading import SparseReading
 
 
@@ -75,11 +75,6 @@ class Prefix:
         return self.tokens_in(self.n_pieces)
 
     @property
-    def pieces(self) -> Sequence[Piece]:
-        """Pieces in the sequence."""
-        return self._pieces
-
-    @property
     def n_pieces(self) -> int:
         """Number of pieces in the sequence."""
         return len(self._pieces)
@@ -118,6 +113,15 @@ class Prefix:
             else:  # some layers may have cached more than others
                 self.reset()
 
+    def n_common(self, pieces: Sequence[Piece]) -> int:
+        """Return how many pieces the sequence and these begin with."""
+        shared = 0
+        for ours, theirs in zip(self._pieces, pieces, strict=False):
+            if ours is not theirs and ours != theirs:
+                break
+            shared += 1
+        return shared
+
     def rewind_to(self, pieces: Sequence[Piece]) -> int:
         """Cut the sequence behind its longest common prefix with these pieces, of which at least
         one is left to feed.
@@ -129,11 +133,7 @@ class Prefix:
         """
         if self._rope is not None:
             self._set_rope(self._rope, pieces)
-        shared = 0
-        for ours, theirs in zip(self._pieces, pieces[:-1], strict=False):
-            if ours is not theirs and ours != theirs:
-                break
-            shared += 1
+        shared = self.n_common(pieces[:-1])
         n_tokens = self._cache.cut_before(self.tokens_in(self._whole_chunks(pieces, shared)))
         if self.sparse is not None:
             n_tokens = self.sparse.cut_before(n_tokens)
@@ -146,7 +146,7 @@ class Prefix:
         many as are in the same chunks, if that decides what tokens see."""
         if self.sparse is None or not self.sparse.goes_by_chunks:
             return shared
-        shown, _ = self._parts(pieces)
+        shown = pieces[: self._n_shown(pieces)]
         ends = [*accumulate(len(chunk) for chunk in chunks(shown, self._chunk_tokens))]
         n_same = 0
         for ours, theirs in zip(self._chunk_ends, ends, strict=False):
@@ -196,7 +196,9 @@ class Prefix:
         """
         self._embed.expect(pieces)
         logits = None
-        n_shown = max(0, len(self._parts([*self._pieces, *pieces])[0]) - self.n_pieces)
+        n_shown = 0
+        if self._reads_in_parts:
+            n_shown = max(0, self._n_shown([*self._pieces, *pieces]) - self.n_pieces)
         shown, asked = pieces[:n_shown], pieces[n_shown:]
         n_stored = self.n_tokens + n_tokens(shown)
         if self.sparse is not None:
@@ -219,16 +221,18 @@ class Prefix:
         """Encode tokens of a reply; return the logits of the next one, (vocabulary,)."""
         return self._forward(list(tokens), is_asked=True)
 
-    def _parts(self, pieces: Sequence[Piece]) -> tuple[Sequence[Piece], Sequence[Piece]]:
-        """Return pieces up to the last frame, behind which prompts on the same frames differ, and
-        the others; a cache that can be cut anywhere gets all at once."""
-        if not (self._cache.needs_marks or self.sparse is not None):
-            return (), pieces
-        ends = [at for at, piece in enumerate(pieces, 1) if not isinstance(piece, int)]
-        n = ends[-1] if ends else 0
-        if not ends and self.sparse is not None:  # of a text, whole chunks
-            n = len(pieces) // self._chunk_tokens * self._chunk_tokens
-        return pieces[:n], pieces[n:]
+    @property
+    def _reads_in_parts(self) -> bool:
+        """True unless the cache can be cut anywhere, and gets all at once."""
+        return self._cache.needs_marks or self.sparse is not None
+
+    def _n_shown(self, prompt: Sequence[Piece]) -> int:
+        """Return how many pieces of a prompt are up to its last frame, behind which prompts on the
+        same frames differ; of a text that is read sparsely, those in whole chunks."""
+        n = end_of_frames(prompt)
+        if not n and self.sparse is not None:
+            return len(prompt) // self._chunk_tokens * self._chunk_tokens
+        return n
 
     @torch.inference_mode()
     def _forward(self, chunk: list[Piece], *, is_asked: bool = False) -> torch.Tensor:

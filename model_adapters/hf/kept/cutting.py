@@ -101,8 +101,8 @@ class CutPrefix:
         numbers = torch.tensor([*cut.clues], dtype=torch.long, device=view.frames.device)
         clues = torch.isin(view.frames, numbers) & view.is_frame
         n_clues = int(clues.sum())
+        nothing = torch.empty(0, dtype=torch.long, device=view.frames.device)
         for layer in range(config.num_hidden_layers if view.cache.layers else 0):
-            nothing = torch.empty(0, dtype=torch.long, device=view.frames.device)
             places = method.keep(view, layer) if view.n_tokens else nothing
             n_counted = int(view.is_frame[places].sum(dim=-1).max()) if len(places) else 0
             if n_counted > view.budget and not method.keeps_all:

@@ -1,7 +1,6 @@
 """Encoded sequences that are kept, so that several memories are cut from one."""
 
 from collections.abc import Callable, Sequence
-from itertools import zip_longest
 
 from model_adapters.hf.cached.kv_cache import BufferedLayer
 from model_adapters.hf.cached.prefix import Prefix
@@ -32,8 +31,8 @@ class PrefixStore:
             pieces: the pieces.
             exactly: True if it must end with them.
         """
-        prefix = max(self._stored, key=lambda it: _n_common(it, pieces), default=None)
-        n_known = 0 if prefix is None else _n_common(prefix, pieces)
+        prefix = max(self._stored, key=lambda it: it.n_common(pieces), default=None)
+        n_known = 0 if prefix is None else prefix.n_common(pieces)
         if prefix is None or (n_known < len(pieces) and n_known < prefix.n_pieces):
             prefix = self._make()  # another trajectory's stays as it is
             n_known = 0
@@ -47,13 +46,6 @@ class PrefixStore:
         while len(self._stored) > 1 and sum(map(_n_bytes, self._stored)) > self._most_bytes:
             del self._stored[0]
         return prefix, n_known
-
-
-def _n_common(prefix: Prefix, pieces: Sequence[Piece]) -> int:
-    for at, (ours, theirs) in enumerate(zip_longest(prefix.pieces, pieces)):
-        if ours is not theirs and ours != theirs:
-            return at
-    return len(pieces)
 
 
 def _n_bytes(prefix: Prefix) -> int:

@@ -79,7 +79,7 @@ def n_common(prompts: Sequence[Sequence[Piece]]) -> int:
 def n_nested(prompts: Sequence[Sequence[Piece]]) -> list[int]:
     """Return how many pieces of each prompt begin the one with the most frames, where those are all
     of its frames; nothing where one has others."""
-    ends = list(map(_end_of_frames, prompts))
+    ends = list(map(end_of_frames, prompts))
     longest = max(ends)
     whole = [prompt for prompt, end in zip(prompts, ends, strict=True) if end == longest]
     common = n_common(whole)
@@ -90,7 +90,7 @@ def n_nested(prompts: Sequence[Sequence[Piece]]) -> list[int]:
     return shared if all(n >= end for n, end in zip(shared, ends, strict=True)) else []
 
 
-def _end_of_frames(prompt: Sequence[Piece]) -> int:
+def end_of_frames(prompt: Sequence[Piece]) -> int:
     """Return how many pieces a prompt has up to its last frame."""
     ends = (at for at, piece in enumerate(prompt, 1) if not isinstance(piece, int))
     return max(ends, default=0)

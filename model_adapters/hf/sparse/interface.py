@@ -93,4 +93,5 @@ def seen_by(mask_function: MaskFunction, rows: Tensor, columns: Tensor) -> Tenso
     first = rows.new_zeros(1, 1, 1, 1)  # the only batch, and any head
     listed = columns.reshape(-1, 1, 1, columns.shape[-1])
     seen = mask_function(first, first, rows[None, None, :, None], listed)[:, 0]
-    return seen.expand(len(listed), len(rows), -1).reshape(*columns.shape[:-1], len(rows), -1)
+    size = (len(rows), columns.shape[-1])  # a rule may go by one of both
+    return seen.expand(len(listed), *size).reshape(*columns.shape[:-1], *size)
