@@ -19,15 +19,13 @@ from model_adapters.hf.prompting.embedding import Span
 from model_adapters.hf.sparse.interface import (
     CannotAttendError,
     MaskFunction,
+    Plan,
     attending,
-    require_plain,
+    by_mask,
     seen_by,
 )
-from model_adapters.hf.sparse.kernel import Keys, attend
 from model_adapters.hf.sparse.layout import Layout
 from model_adapters.hf.sparse.reading import SparseReading
-
-_HINT = "set batch_size=1"
 
 
 class _WatchedCache(BufferedCache):
@@ -120,7 +118,6 @@ class BranchAttention:
             self._positions = sparse.layout.number
             self._n_prefix = len(self._positions)
         self._n_new = 0
-        self._n_calls = 0
 
     @contextmanager
     def appended(
@@ -134,8 +131,7 @@ class BranchAttention:
             positions: their positions, (1, tokens) or (3, 1, tokens).
 
         Raises:
-            CannotAttendError: the decoder has layers that do not attend by transformers' interface,
-                or with masks that are not made by transformers' functions of positions.
+            CannotAttendError: the decoder attends in another way; see `attending`.
         """
         new = torch.tensor([branches, n_before]).to(self._branches.device)
         self._branches = torch.cat((self._branches, new[0]))
@@ -143,92 +139,21 @@ class BranchAttention:
         if self._window is not None:
             self._layout += Layout.of_words(new[1], positions)
         self._n_new = len(branches)
-        self._n_calls = 0
-        with attending(self._config, f"branches_{id(self)}", self._attention, self._mask):
+        with attending(self._config, positions.device, self._plan, "set batch_size=1"):
             yield
-        if self._n_calls != self._config.num_hidden_layers:
-            raise CannotAttendError(
-                "the model's layers do not all attend by transformers' interface; set batch_size=1"
-            )
 
-    def _attention(
-        self,
-        module: Any,
-        query: Tensor,
-        key: Tensor,
-        value: Tensor,
-        attention_mask: Tensor | None,
-        *,
-        scaling: float | None = None,
-        **others: Any,
-    ) -> tuple[Tensor, None]:
-        """Return the attention of the new tokens, in the form of transformers' attention functions.
-
-        Args:
-            module: attention module of the layer.
-            query: queries, (1, heads, new tokens, head size).
-            key: keys, (1, key heads, all tokens, head size).
-            value: values, like `key`.
-            attention_mask: what `_mask` returned, handed on by the model.
-            scaling: factor of the dot products; by the head size where None.
-            others: settings of some models. Windows are among them, which the mask has already.
-
-        Returns:
-            The outputs, (1, new tokens, heads, head size), and None instead of weights.
-
-        Raises:
-            CannotAttendError: the model adds something to the scores, or gives a layer no mask.
-        """
-        mask = require_plain(attention_mask, others, _HINT)
-        self._n_calls += 1
-        n_key_heads = key.shape[1]
-        # Heads that share keys become the second axis, along which a view repeats keys without a
-        # copy.
-        shared = (n_key_heads, query.shape[1] // n_key_heads)
-        if self._window is not None:
-            rows = self._layout[-self._n_new :]
-            output = self._window.part(rows, self._layout, mask[0, 0])(
-                module.layer_idx,
-                query.unflatten(1, shared)[0],
-                key[0, :, None],
-                value[0, :, None],
-                scaling,
-            )
-            return output.flatten(0, 1).transpose(0, 1)[None], None
-        seen = mask[0, 0].to(query.device)  # a model can be on several devices
-        among = Keys(key[0, :, None], value[0, :, None], seen)
-        output = attend(query.unflatten(1, shared)[0], among, scaling)
-        return output.flatten(0, 1).transpose(0, 1)[None], None
-
-    def _mask(
-        self,
-        *,
-        mask_function: MaskFunction,
-        use_vmap: bool = False,
-        local_size: int | None = None,
-        **others: Any,
-    ) -> Tensor:
-        """Return which tokens the new ones attend to, (1, 1, new tokens, all tokens), true or
-        false, in the form of transformers' mask functions.
-
-        Args:
-            mask_function: whether a token attends to another, by batch, head and both positions.
-            use_vmap: true if the model adds a rule of its own, which may go by more than positions.
-            local_size: the model's window or chunk in tokens, None without.
-            others: sizes of the sequence, which are known here.
-
-        Raises:
-            CannotAttendError: the model adds a rule of its own.
-        """
-        if use_vmap:
-            raise CannotAttendError("the model adds rules of its own to masks; set batch_size=1")
+    def _plan(self, mask_function: MaskFunction, local_size: int | None) -> Plan:
+        """Return the attention of the new tokens, each of which sees its branch and the prefix as
+        far as a rule lets it."""
         if local_size is not None:
             self.windows.add(local_size)
         new_ones = self._positions[-self._n_new :]
-        seen = seen_by(mask_function, new_ones, self._positions).contiguous()[None, None]
+        seen = seen_by(mask_function, new_ones, self._positions).contiguous()
         # In place, because a copy for every token would be as long as the context.
         new = self._branches[-self._n_new :, None]
-        seen[..., self._n_prefix :] &= self._branches == new
+        seen[:, self._n_prefix :] &= self._branches == new
         if self._seen is not None:
-            seen[..., : self._n_prefix] &= self._positions[: self._n_prefix] < self._seen[new]
-        return seen
+            seen[:, : self._n_prefix] &= self._positions[: self._n_prefix] < self._seen[new]
+        if self._window is None:
+            return by_mask(seen)
+        return self._window.part(self._layout[-self._n_new :], self._layout, seen)

@@ -18,7 +18,7 @@ from model_adapters.hf.cached.kv_cache import BufferedCache, cache_arguments
 from model_adapters.hf.family import Family
 from model_adapters.hf.loading.rope import LengthRope
 from model_adapters.hf.prompting.embedding import Embed
-from model_adapters.hf.prompting.prompt import Piece, end_of_frames, n_tokens, token_ids
+from model_adapters.hf.prompting.prompt import Piece, end_of_frames, n_tokens, token_ids, width
 from model_adapters.hf.sparse.reading import SparseReading
 
 
@@ -257,7 +257,7 @@ class Prefix:
                 self.reset()
         end = self.n_tokens
         for piece in chunk:
-            end += 1 if isinstance(piece, int) else len(piece.ids)
+            end += width(piece)
             self._pieces.append(piece)
             self._ends.append(end)
         self._starts[-1:] = [*span.starts, span.end]
@@ -269,12 +269,11 @@ def chunks(pieces: Sequence[Piece], chunk_tokens: int) -> Iterator[list[Piece]]:
     chunk: list[Piece] = []
     size = 0
     for piece in pieces:
-        width = 1 if isinstance(piece, int) else len(piece.ids)
-        if chunk and size + width > chunk_tokens:
+        if chunk and size + width(piece) > chunk_tokens:
             yield chunk
             chunk = []
             size = 0
         chunk.append(piece)
-        size += width
+        size += width(piece)
     if chunk:
         yield chunk

@@ -1,15 +1,13 @@
 """Cutting the cache of an encoded sequence, and standing for it when questions follow."""
 
-import importlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from pkgutil import resolve_name
 from statistics import fmean
 from typing import Any, NamedTuple
 
 import torch
 from torch import Tensor
-from transformers.masking_utils import AttentionMaskInterface
-from transformers.modeling_utils import ALL_ATTENTION_FUNCTIONS
 
 from infthor_eval.errors import ModelError
 from model_adapters.hf.cached.kv_cache import BufferedCache
@@ -17,7 +15,7 @@ from model_adapters.hf.cached.prefix import Prefix
 from model_adapters.hf.kept.methods import CacheMethod
 from model_adapters.hf.kept.view import CacheView
 from model_adapters.hf.prompting.prompt import Piece, n_tokens
-from model_adapters.hf.sparse.interface import attending
+from model_adapters.hf.sparse.interface import attending, by_mask
 from model_adapters.protocols import CacheCut, KeptCache
 
 
@@ -27,10 +25,9 @@ def method_of(cut: CacheCut) -> CacheMethod:
     Raises:
         ModelError: it cannot be imported.
     """
-    module, _, name = cut.method.partition(":")
     try:
-        method: CacheMethod = getattr(importlib.import_module(module), name)()
-    except (ImportError, AttributeError, TypeError) as error:
+        method: CacheMethod = resolve_name(cut.method)()
+    except (ImportError, AttributeError, TypeError, ValueError) as error:
         raise ModelError(f"the method {cut.method} of a cache cannot be made ({error})") from error
     return method
 
@@ -161,25 +158,23 @@ def attention_of(prefix: Prefix, config: Any, pieces: Sequence[Piece]) -> list[T
         config: config of the decoder.
         pieces: the frame, and what is asked behind it.
     """
-    n_before = prefix.n_tokens
-    n_pieces = prefix.n_pieces
+    n_before, n_pieces = prefix.n_tokens, prefix.n_pieces
+    prefix.feed(pieces[:1])
     found: list[list[Tensor]] = [[] for _ in range(config.num_hidden_layers)]
-    dense = ALL_ATTENTION_FUNCTIONS["sdpa"]
 
-    def attention(module: Any, query: Tensor, key: Tensor, *others: Any, **options: Any) -> Any:
-        scale = options.get("scaling") or query.shape[-1] ** -0.5
-        heads = query[0].unflatten(0, (key.shape[1], -1))  # (key heads, sharing, new, head size)
-        scores = (heads @ key[0, :, None].transpose(-1, -2)).float() * scale
-        n_new = query.shape[2]
-        places = torch.arange(key.shape[2], device=key.device)
-        later = places > places[-n_new:, None]
-        weights = scores.masked_fill(later, -torch.inf).softmax(dim=-1)
-        found[module.layer_idx].append(weights[..., :n_before].mean(dim=1))
-        return dense(module, query, key, *others, **options)
+    def attend_watched(
+        layer: int, query: Tensor, key: Tensor, value: Tensor, scale: float | None
+    ) -> Tensor:
+        factor = query.shape[-1] ** -0.5 if scale is None else scale
+        places = torch.arange(key.shape[-2], device=key.device)
+        seen = places <= places[-query.shape[-2] :, None]
+        scores = (query @ key.transpose(-1, -2)).float() * factor
+        weights = scores.masked_fill(~seen, -torch.inf).softmax(dim=-1)
+        found[layer].append(weights[..., :n_before].mean(dim=1))
+        return by_mask(seen)(layer, query, key, value, scale)
 
-    mask = AttentionMaskInterface._global_mapping["sdpa"]
-    with attending(config, f"watched_{id(found)}", attention, mask):
-        prefix.feed(pieces)
+    device = prefix.cache.layers[0].keys.device
+    with attending(config, device, lambda *_: attend_watched, "use another memory"):
+        prefix.feed(pieces[1:])
     prefix.cut(n_pieces)
-    n_frame = n_tokens(pieces[:1])
-    return [torch.cat(parts, dim=1)[:, n_frame:].mean(dim=1) for parts in found]
+    return [torch.cat(parts, dim=1).mean(dim=1) for parts in found]

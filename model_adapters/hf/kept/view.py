@@ -9,7 +9,7 @@ from torch import Tensor
 
 from model_adapters.hf.cached.kv_cache import BufferedCache, BufferedLayer
 from model_adapters.hf.cached.prefix import Prefix
-from model_adapters.hf.prompting.prompt import Piece, n_tokens
+from model_adapters.hf.prompting.prompt import Piece, n_tokens, width
 from model_adapters.protocols import CacheCut
 
 
@@ -49,7 +49,7 @@ class CacheView:
         begin = n_tokens(pieces[:n_opening])
         shown = pieces[n_opening:]
         owners = owners_of(shown)
-        widths = torch.tensor([n_tokens([piece]) for piece in shown], dtype=torch.long)
+        widths = torch.tensor([*map(width, shown)], dtype=torch.long)
         is_frame = torch.tensor([not isinstance(piece, int) for piece in shown], dtype=torch.bool)
         frames = torch.tensor(owners, dtype=torch.long).repeat_interleave(widths)
         layers = prefix.cache.layers

@@ -10,7 +10,7 @@ import torch
 from infthor_eval.errors import ModelError
 from model_adapters.hf.family import Family
 from model_adapters.hf.prompting.features import FeatureCache
-from model_adapters.hf.prompting.prompt import Clip, Frame, Piece
+from model_adapters.hf.prompting.prompt import Clip, Frame, Piece, width
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,7 @@ def piece_starts(
     at = 0
     for piece in pieces:
         starts.append(behind[at])
-        at += 1 if isinstance(piece, int) else len(piece.ids)
+        at += width(piece)
     return tuple(starts), behind[-1]
 
 

@@ -62,9 +62,14 @@ class Clip:
 Piece = int | Frame | Clip
 
 
+def width(piece: Piece) -> int:
+    """Return the tokens of a piece."""
+    return 1 if isinstance(piece, int) else len(piece.ids)
+
+
 def n_tokens(pieces: Sequence[Piece]) -> int:
     """Return the tokens of a prompt, frames and clips expanded."""
-    return sum(1 if isinstance(piece, int) else len(piece.ids) for piece in pieces)
+    return sum(map(width, pieces))
 
 
 def n_common(prompts: Sequence[Sequence[Piece]]) -> int:

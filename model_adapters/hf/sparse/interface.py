@@ -4,11 +4,13 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, Protocol
 
+import torch
 from torch import Tensor
 from transformers.masking_utils import AttentionMaskInterface
 from transformers.modeling_utils import ALL_ATTENTION_FUNCTIONS
 
 from infthor_eval.errors import ModelError
+from model_adapters.hf.sparse.kernel import Keys, attend
 
 _NOT_COMPUTED = ("softcap", "s_aux", "position_bias")  # what some models add to the scores
 # Whether a token sees another, by batch, head and both numbers in the sequence.
@@ -33,23 +35,74 @@ class Plan(Protocol):
         """
 
 
+# Attention by a mask's rule, and by its window or chunk in tokens, None without.
+PlanMaker = Callable[[MaskFunction, int | None], Plan]
+
+
 class CannotAttendError(ModelError):
     """A model attends in a way that cannot be taken the place of."""
 
 
 @contextmanager
-def attending(
-    config: Any, name: str, attention: Callable[..., Any], mask: Callable[..., Tensor]
-) -> Iterator[None]:
-    """Let a decoder attend by these functions within the context.
+def attending(config: Any, device: torch.device, plan: PlanMaker, hint: str) -> Iterator[None]:
+    """Let a decoder attend by plans within the context, in which it is run.
 
     Args:
         config: config of the decoder.
-        name: a name that nobody else uses at the same time.
-        attention: in the form of transformers' attention functions.
-        mask: in the form of transformers' mask functions.
+        device: device of its inputs.
+        plan: makes the attention of the layers of one mask, each time that the decoder is run.
+        hint: what to do where the model does not allow it.
+
+    Raises:
+        CannotAttendError: the decoder has layers that do not attend by transformers' interface,
+            that add something to the scores, or with masks that are not made by transformers'
+            functions of positions.
     """
+    plans: list[Plan] = []
+    n_calls = 0
+
+    def mask(
+        *,
+        mask_function: MaskFunction,
+        use_vmap: bool = False,
+        local_size: int | None = None,
+        **_sizes: Any,
+    ) -> Tensor:
+        """Return the number of a plan, in place of a mask as long as the context."""
+        if use_vmap:
+            raise CannotAttendError(f"the model adds rules of its own to masks; {hint}")
+        plans.append(plan(mask_function, local_size))
+        return torch.full((1, 1, 1, 1), len(plans) - 1, device=device)
+
+    def attention(
+        module: Any,
+        query: Tensor,
+        key: Tensor,
+        value: Tensor,
+        attention_mask: Tensor | None,
+        *,
+        scaling: float | None = None,
+        **others: Any,
+    ) -> tuple[Tensor, None]:
+        """Return the outputs, (1, new tokens, heads, head size), of queries, (1, heads, new tokens,
+        head size), on keys and values, (1, key heads, stored tokens, head size)."""
+        nonlocal n_calls
+        n_calls += 1
+        added = [name for name in _NOT_COMPUTED if others.get(name) is not None]
+        if added:
+            raise CannotAttendError(f"the model's attention has {added[0]}; {hint}")
+        if attention_mask is None or attention_mask.dtype != torch.long:
+            raise CannotAttendError(
+                f"the model's masks are not all made by transformers' functions; {hint}"
+            )
+        # Heads that share keys become the second axis, along which a view repeats keys.
+        queries = query[0].unflatten(0, (key.shape[1], -1))
+        attend_by = plans[int(attention_mask)]
+        output = attend_by(module.layer_idx, queries, key[0, :, None], value[0, :, None], scaling)
+        return output.flatten(0, 1).transpose(0, 1)[None], None
+
     before = config._attn_implementation
+    name = f"plans_{id(plans)}"
     # The functions are put into the dictionaries directly, because registered ones cannot be
     # removed; transformers looks for masks in that of the class.
     masks = AttentionMaskInterface._global_mapping
@@ -61,22 +114,23 @@ def attending(
     finally:
         config._attn_implementation = before
         del ALL_ATTENTION_FUNCTIONS[name], masks[name]
-
-
-def require_plain(attention_mask: Tensor | None, others: dict[str, Any], hint: str) -> Tensor:
-    """Return a layer's mask, if it adds nothing else to the scores.
-
-    Raises:
-        CannotAttendError: it adds something, or has no mask.
-    """
-    added = [name for name in _NOT_COMPUTED if others.get(name) is not None]
-    if added:
-        raise CannotAttendError(f"the model's attention has {added[0]}; {hint}")
-    if attention_mask is None:
+    if n_calls == 0 or n_calls % config.num_hidden_layers:
         raise CannotAttendError(
-            f"the model's masks are not all made by transformers' functions; {hint}"
+            f"the model's layers do not all attend by transformers' interface; {hint}"
         )
-    return attention_mask
+
+
+def by_mask(seen: Tensor) -> Plan:
+    """Return dense attention of queries, each of which sees a key at least, under a mask of
+    (queries, stored tokens)."""
+
+    def attend_by(
+        _layer: int, query: Tensor, key: Tensor, value: Tensor, scale: float | None
+    ) -> Tensor:
+        # A model can be on several devices.
+        return attend(query, Keys(key, value, seen.to(query.device)), scale)
+
+    return attend_by
 
 
 def seen_by(mask_function: MaskFunction, rows: Tensor, columns: Tensor) -> Tensor:

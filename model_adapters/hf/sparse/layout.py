@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 import torch
 from torch import Tensor
 
-from model_adapters.hf.prompting.prompt import Piece
+from model_adapters.hf.prompting.prompt import Piece, width
 
 
 @dataclass(frozen=True)
@@ -45,15 +45,15 @@ class Layout:
             positions: their positions, (1, tokens) or (3, 1, tokens).
             by_frames: True if frames are seen as a whole.
         """
-        widths = [1 if isinstance(piece, int) else len(piece.ids) for piece in pieces]
+        widths = [*map(width, pieces)]
         device = positions.device
         number = torch.arange(start, start + sum(widths), device=device)
         first = last = number
         if by_frames:
-            width = torch.tensor(widths, device=device)
-            ends = start + width.cumsum(0)
-            first = (ends - width).repeat_interleave(width)
-            last = (ends - 1).repeat_interleave(width)
+            sizes = torch.tensor(widths, device=device)
+            ends = start + sizes.cumsum(0)
+            first = (ends - sizes).repeat_interleave(sizes)
+            last = (ends - 1).repeat_interleave(sizes)
         axes = _axes(positions)
         behind = axes.amax(dim=0).cummax(dim=0).values + 1
         return cls(number, first, last, axes.amin(dim=0), behind)

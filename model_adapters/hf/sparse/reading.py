@@ -9,20 +9,11 @@ import torch
 from torch import Tensor
 
 from model_adapters.hf.cached.kv_cache import BufferedCache
-from model_adapters.hf.prompting.prompt import Piece
+from model_adapters.hf.prompting.prompt import Piece, n_tokens
 from model_adapters.hf.sparse.chosen import ChosenAttention
-from model_adapters.hf.sparse.interface import (
-    CannotAttendError,
-    MaskFunction,
-    Plan,
-    attending,
-    require_plain,
-    seen_by,
-)
+from model_adapters.hf.sparse.interface import MaskFunction, Plan, attending, seen_by
 from model_adapters.hf.sparse.layout import Layout
 from model_adapters.hf.sparse.window import WindowAttention
-
-_HINT = "leave attention out"
 
 
 class SparseReading:
@@ -52,9 +43,6 @@ class SparseReading:
     def reset(self) -> None:
         """Begin a sequence."""
         self.layout = Layout.empty(self._device)
-        self._masks: list[MaskFunction] = []
-        self._plans: dict[int, Plan] = {}  # by the mask
-        self._n_calls = 0
 
     @property
     def window(self) -> WindowAttention | None:
@@ -104,54 +92,15 @@ class SparseReading:
                 these are chosen for chunks.
 
         Raises:
-            CannotAttendError: the decoder's layers do not all attend by transformers' interface.
+            CannotAttendError: the decoder attends in another way; see `attending`.
         """
         self.layout += Layout.of(pieces, start, positions, by_frames=self._by_frames)
         if is_asked and self.goes_by_chunks:
             yield
             return
-        self._masks = []
-        self._plans = {}
-        self._n_calls = 0
-        with attending(self._config, f"sparse_{id(self)}", self._attention, self._mask):
+
+        def plan(mask_function: MaskFunction, _local_size: int | None) -> Plan:
+            return self._rule.plan(self.layout, n_tokens(pieces), partial(seen_by, mask_function))
+
+        with attending(self._config, self._device, plan, "leave attention out"):
             yield
-        if self._n_calls != self._config.num_hidden_layers:
-            raise CannotAttendError(
-                f"the model's layers do not all attend by transformers' interface; {_HINT}"
-            )
-
-    def _attention(
-        self,
-        module: Any,
-        query: Tensor,
-        key: Tensor,
-        value: Tensor,
-        attention_mask: Tensor | None,
-        *,
-        scaling: float | None = None,
-        **others: Any,
-    ) -> tuple[Tensor, None]:
-        """Return the attention of the new tokens, in the form of transformers' functions."""
-        mask = int(require_plain(attention_mask, others, _HINT).flatten()[0])
-        if mask not in self._plans:  # it is the same in all layers of a mask
-            seen = partial(seen_by, self._masks[mask])
-            self._plans[mask] = self._rule.plan(self.layout, query.shape[2], seen)
-        self._n_calls += 1
-        n_key_heads = key.shape[1]
-        output = self._plans[mask](
-            module.layer_idx,
-            query.unflatten(1, (n_key_heads, query.shape[1] // n_key_heads))[0],
-            key[0, :, None],
-            value[0, :, None],
-            scaling,
-        )
-        return output.flatten(0, 1).transpose(0, 1)[None], None
-
-    def _mask(
-        self, *, mask_function: MaskFunction, use_vmap: bool = False, **_others: Any
-    ) -> Tensor:
-        """Return the number of a rule, in place of a mask as long as the context."""
-        if use_vmap:
-            raise CannotAttendError(f"the model adds rules of its own to masks; {_HINT}")
-        self._masks.append(mask_function)
-        return torch.full((1, 1, 1, 1), len(self._masks) - 1, device=self._device)

@@ -14,6 +14,7 @@ from model_adapters.hf.sparse.interface import attending
 
 _MOVED = 7  # positions that a sample is moved by
 _TOLERANCE = 0.02  # of the largest value; of half precision
+_HINT = "use positions=absolute, or another attention"
 
 
 @dataclass(frozen=True)
@@ -77,27 +78,22 @@ def _way(ways: Sequence[Rotation], here: Tensor, moved: Tensor) -> Rotation:
         fits = 2 * len(way.frequencies) <= here.shape[-1]
         if fits and (way.turn(here, distance) - moved).abs().max() <= _TOLERANCE * here.abs().max():
             return way
-    raise ModelError(
-        "the model's positions are none that can be turned; use positions=absolute, or another "
-        "attention"
-    )
+    raise ModelError(f"the model's positions are none that can be turned; {_HINT}")
 
 
 def _keys(model: Any, embed: Embed, position: int) -> list[Tensor]:
-    """Return the keys of a word in each layer, (1, key heads, 1, head size)."""
+    """Return the keys of a word in each layer, (key heads, 1, 1, head size)."""
     found: list[Tensor] = []
 
-    def attention(
-        _module: Any, query: Tensor, key: Tensor, value: Tensor, *_: Any, **__: Any
-    ) -> tuple[Tensor, None]:
+    def attend(
+        _layer: int, query: Tensor, key: Tensor, value: Tensor, _scale: float | None
+    ) -> Tensor:
         found.append(key.float())
-        # It sees itself alone.
-        repeated = value.repeat_interleave(query.shape[1] // value.shape[1], dim=1)
-        return repeated.transpose(1, 2), None
+        return value.expand_as(query)  # it sees itself alone
 
     config = model.get_decoder().config
     span = embed.words([0], [position])
-    with attending(config, "keys", attention, lambda **_: span.positions.new_ones(1, 1, 1, 1)):
+    with attending(config, span.positions.device, lambda *_: attend, _HINT):
         model(
             **span.inputs,
             position_ids=span.positions,

@@ -3,13 +3,12 @@ arXiv:2309.17453)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import torch
 from torch import Tensor
 
-from model_adapters.hf.sparse.interface import Plan, SeenBy
-from model_adapters.hf.sparse.kernel import Keys, attend, attend_to_both
+from model_adapters.hf.sparse.interface import Plan, SeenBy, by_mask
+from model_adapters.hf.sparse.kernel import Keys, attend_to_both
 from model_adapters.hf.sparse.layout import Layout
 from model_adapters.hf.sparse.rotation import Rotation
 from model_adapters.options.attention import Window
@@ -92,7 +91,7 @@ class WindowAttention:
         far = seen[:, :n_sinks] & ~near[:, :n_sinks]
         if self.positions == "absolute" or not bool(far.any()):
             near[:, :n_sinks] |= far
-            return partial(_attend, near)
+            return by_mask(near)
         begins = columns.position[near.int().argmax(dim=-1)]  # of each query's window
         if self.positions == "ceiling":
             query_moves = self.shape.window - rows.position
@@ -118,12 +117,6 @@ class WindowAttention:
 
     def _is_no_sink(self, layout: Layout) -> Tensor:
         return layout.last >= self.shape.sinks
-
-
-def _attend(
-    seen: Tensor, _layer: int, query: Tensor, key: Tensor, value: Tensor, scale: float | None
-) -> Tensor:
-    return attend(query, Keys(key, value, seen), scale)
 
 
 def _joined(n_first: int, begin: int, end: int, device: torch.device) -> slice | Tensor:
