@@ -88,6 +88,7 @@ _ORDER = (
     "molmo2",
     "cohere2_vision",
     "lfm2_vl",
+    "nemotron_h_omni",
     "video_llama_3",
 )
 FAMILIES = {name: _ALL[name] for name in _ORDER}

@@ -1,6 +1,7 @@
 """What sparse attention costs by the length of a context: seconds of attention, and the cache.
 
     python -m benchmarks.sparse_attention [--tokens 8000,32000] [--attention all,window:4096]
+    python -m benchmarks.sparse_attention --attention all --decoder nemotron_h
 
 A language model with random weights, four layers of 16 heads of 64 (4 of keys), reads random words
 by the harness's own encoding, in chunks of 1,024. `all` is dense attention by torch's kernel. Times
@@ -15,17 +16,20 @@ On a GPU (not run yet; rehearsed here with `--shape small --tokens 2000`), six m
 import argparse
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import pytest
 import torch
-from transformers import AutoModelForCausalLM, Qwen2Config
+from transformers import AutoConfig, AutoModelForCausalLM
 from transformers.modeling_utils import ALL_ATTENTION_FUNCTIONS
 
 from model_adapters import load
 from model_adapters.hf.cached.kv_cache import BufferedLayer
-from model_adapters.hf.sparse.reading import SparseReading
+from model_adapters.hf.sparse.chosen import ChosenAttention
+from model_adapters.hf.sparse.window import WindowAttention
 from model_adapters.tiny.tokenizer import train_tokenizer
 
 DENSE = "all"
@@ -44,6 +48,23 @@ SHAPES: dict[str, dict[str, int]] = {
         "num_hidden_layers": 28,
         "num_attention_heads": 28,
         "num_key_value_heads": 4,
+    },
+}
+# What decoders have beside a shape: layers without keys, as far as published ones mix them.
+DECODERS: dict[str, dict[str, Any]] = {
+    "qwen2": {},
+    "qwen3_5_text": {
+        "layer_types": [*["linear_attention"] * 3, "full_attention"],
+        **{f"linear_num_{what}_heads": 8 for what in ("key", "value")},
+        **{f"linear_{what}_head_dim": 64 for what in ("key", "value")},
+    },
+    "lfm2": {"layer_types": [*["conv"] * 3, "full_attention"]},
+    "nemotron_h": {
+        "layers_block_type": [*["linear_attention"] * 3, "full_attention"],
+        "ssm_state_size": 64,
+        "mamba_num_heads": 16,
+        "mamba_head_dim": 32,
+        "n_groups": 2,
     },
 }
 
@@ -65,15 +86,35 @@ class Clock:
 
         return call
 
+    @contextmanager
+    def watching(self) -> Iterator[None]:
+        """Time dense attention by torch, and both kinds of sparse attention, within the context."""
+        with pytest.MonkeyPatch.context() as patch:
+            dense = ALL_ATTENTION_FUNCTIONS["sdpa"]
+            patch.setitem(ALL_ATTENTION_FUNCTIONS, "sdpa", self.timed(dense))
+            for rule in (WindowAttention, ChosenAttention):
+                patch.setattr(rule, "plan", self._timed_plan(rule.plan))
+            yield
 
-def save_model(folder: Path, shape: str, dtype: torch.dtype) -> None:
+    def _timed_plan(self, plan: Callable[..., Any]) -> Callable[..., Any]:
+        """Return what makes plans; making one is timed, and what it makes."""
+        timed = self.timed(plan)
+
+        def make(*arguments: Any) -> Any:
+            return self.timed(timed(*arguments))
+
+        return make
+
+
+def save_model(folder: Path, decoder: str, shape: str, dtype: torch.dtype) -> None:
     """Save a language model with random weights, of a shape whose cost is attention or of 7B."""
     tokenizer = train_tokenizer(
         ("<s>", "<end>", "<pad>"), end="<end>", pad="<pad>", begin="<s>", named={}
     )
     tokenizer.save_pretrained(folder)
     torch.manual_seed(0)
-    config = Qwen2Config(vocab_size=len(tokenizer), max_position_embeddings=2**20, **SHAPES[shape])
+    settings = {"vocab_size": len(tokenizer), "max_position_embeddings": 2**20}
+    config = AutoConfig.for_model(decoder, **settings, **SHAPES[shape], **DECODERS[decoder])
     AutoModelForCausalLM.from_config(config, dtype=dtype).save_pretrained(folder)
 
 
@@ -94,22 +135,22 @@ def measure(folder: Path, attention: str, n_tokens: int, device: str) -> Measure
     model: Any = load("hf-lm", options, 0)
     clock = Clock()
     words = torch.randint(5, 200, (n_tokens,), generator=torch.Generator().manual_seed(1)).tolist()
-    dense = ALL_ATTENTION_FUNCTIONS["sdpa"]
-    sparse = SparseReading._attention
-    ALL_ATTENTION_FUNCTIONS["sdpa"] = clock.timed(dense)
-    SparseReading._attention = clock.timed(sparse)  # type: ignore[method-assign]
-    try:
+    with clock.watching():
         model.forget()
         start = time.perf_counter()
         logits = model._prefix.feed(words).cpu()
         encoding = time.perf_counter() - start
-    finally:
-        ALL_ATTENTION_FUNCTIONS["sdpa"] = dense
-        SparseReading._attention = sparse  # type: ignore[method-assign]
-    layers = [it for it in model._prefix.cache.layers if isinstance(it, BufferedLayer)]
-    n_bytes = sum(layer.n_bytes for layer in layers)
+    n_bytes = sum(map(bytes_of, model._prefix.cache.layers))
     model.close()
     return Measured(clock.seconds, encoding, n_bytes, logits)
+
+
+def bytes_of(layer: Any) -> int:
+    """Return the bytes of a layer's keys and values, or of its states."""
+    if isinstance(layer, BufferedLayer):
+        return layer.n_bytes
+    states = [*layer.conv_states.values(), *layer.recurrent_states.values()]
+    return sum(state.nbytes for state in states if state is not None)
 
 
 def check(folder: Path, device: str) -> None:
@@ -129,11 +170,13 @@ def main() -> None:
     parser.add_argument("--device", default="cpu")
     parser.add_argument("--dtype", default="float32")
     parser.add_argument("--shape", choices=SHAPES, default="small")
+    parser.add_argument("--decoder", choices=DECODERS, default="qwen2")
     parser.add_argument("--check", action="store_true")
     arguments = parser.parse_args()
     lengths = [int(text) for text in arguments.tokens.split(",")]
     with tempfile.TemporaryDirectory() as folder:
-        save_model(Path(folder), arguments.shape, getattr(torch, arguments.dtype))
+        dtype = getattr(torch, arguments.dtype)
+        save_model(Path(folder), arguments.decoder, arguments.shape, dtype)
         if arguments.check:
             check(Path(folder), arguments.device)
         for attention in arguments.attention.split(","):

@@ -1,10 +1,11 @@
 """What sparse attention and memories in the cache forget: net pairs of twins, and clues kept.
 
-    python -m benchmarks.what_is_forgotten --out DIR [--budget 27,90] [--limit 612] [--picture PNG]
+    python -m benchmarks.what_is_forgotten --out DIR [--budget 27,90,270] [--picture PNG]
+    python -m benchmarks.what_is_forgotten --out DIR --moments SET/moments.csv
 
-Runs `infthor-eval` with the included model on the bundled twins: dense attention, sparse shapes,
-memories in the cache and memories of frames at equal tokens. Finished runs are not run again. It
-prints a table in Markdown, and draws it (`--picture PNG`).
+Runs `infthor-eval` with the included model on the bundled twins or on moments: dense attention,
+sparse shapes, memories in the cache and memories of frames at equal tokens. Finished runs are not
+run again. It prints a table in Markdown, and draws it (`--picture PNG`).
 """
 
 import argparse
@@ -18,16 +19,14 @@ from typing import Any
 from matplotlib.figure import Figure
 
 FRAMES = ("last", "uniform", "random", "oracle")
-CACHES = ("kv-window", "kv-sinks", "kv-uniform", "kv-random", "kv-oracle")
+CACHES: tuple[str, ...] = ("kv-window", "kv-sinks", "kv-uniform", "kv-random", "kv-oracle")
 CACHES += ("kv-question", "kv-norm", "kv-merge")
 SHAPES = ("sinks:4+window:{}", "block-sparse:2", "vertical-slash:.2")
 ENDS = ("low", "high")
-_ASKED = ("--model", "qwen2.5-vl-nano", "--tasks", "nieh_mini_twins", "--quiet")
 
 
-def commands(budgets: str, limit: int) -> Iterator[tuple[str, list[str]]]:
-    """Yield the name of each group of runs, and its arguments."""
-    asked = [*_ASKED, "--limit", str(limit)]
+def commands(budgets: str, asked: Sequence[str]) -> Iterator[tuple[str, list[str]]]:
+    """Yield the name of each group of runs, and its arguments, of which some say what is asked."""
     yield "dense", [*asked, "--context", "trajectory"]
     for shape in SHAPES:
         for budget in budgets.split(",") if "{}" in shape else [""]:
@@ -105,11 +104,19 @@ def main() -> None:
     """Run what is missing, print the table, and draw it."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--out", type=Path, required=True)
-    parser.add_argument("--budget", default="27,90")
-    parser.add_argument("--limit", type=int, default=612)
+    parser.add_argument("--budget", default="27,90,270")
+    parser.add_argument("--moments", help="questions of `infthor-eval moments`, in place of twins")
+    parser.add_argument("--limit", help="most questions")
     parser.add_argument("--picture", type=Path)
     arguments = parser.parse_args()
-    for name, words in commands(arguments.budget, arguments.limit):
+    asked = ["--model", "qwen2.5-vl-nano", "--quiet", "--tasks"]
+    if arguments.moments is None:
+        asked += ["nieh_mini_twins"]
+    else:
+        asked += ["nieh_moments", "--data", arguments.moments]
+    if arguments.limit is not None:
+        asked += ["--limit", arguments.limit]
+    for name, words in commands(arguments.budget, asked):
         command = [str(Path(sys.executable).with_name("infthor-eval")), *words]
         subprocess.run([*command, "--out", str(arguments.out / name)], check=True)
     found = rows(arguments.out)

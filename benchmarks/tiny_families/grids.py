@@ -211,6 +211,38 @@ _LFM2 = headers(
     start="<|startoftext|>",
 )
 
+
+def _nemotron_config(vocabulary: Vocabulary) -> dict[str, Any]:
+    kinds = ["linear_attention", "full_attention", "linear_attention", "mlp"]
+    return {
+        "image_token_id": vocabulary["<image>"],
+        "text_config": vocabulary.text(
+            "nemotron_h",
+            layers_block_type=kinds,
+            num_hidden_layers=len(kinds),
+            ssm_state_size=8,
+            mamba_num_heads=8,
+            mamba_head_dim=32,
+            n_groups=2,
+            chunk_size=8,
+        ),
+        "vision_config": {
+            "hidden_size": 32,
+            "num_hidden_layers": 1,
+            "num_attention_heads": 2,
+            "patch_size": PATCH,
+            "image_size": 4 * PATCH,
+            "max_img_size": 16 * PATCH,
+            "num_cls_tokens": 1,
+            "num_registers": 1,
+            "summary_idxs": [0],
+            "video_temporal_patch_size": 2,
+        },
+        "projector_hidden_size": 64,
+        "vision_hidden_size": 32,
+    }
+
+
 _MINICPM_TOKENS = {
     "image_token": "<|image_pad|>",
     "video_token": "<|video_pad|>",
@@ -354,6 +386,25 @@ GRIDS = {
             "tile_size": 128,
         },
         processor={"processor_class": "Lfm2VlProcessor"},
+    ),
+    "nemotron_h_omni": Family(
+        chat=CHATML,
+        image="<image>\n",
+        named={"image_token": "<image>"},
+        special=("<video>", "<so_embedding>", "<img>", "</img>"),
+        config=_nemotron_config,
+        images={
+            "image_processor_type": "NemotronH_Omni_Reasoning_V3ImageProcessor",
+            "patch_size": PATCH,
+            "do_resize": False,  # it is scaled with the patches
+            "min_num_patches": 4,
+            "max_num_patches": 36,
+        },
+        processor={
+            "processor_class": "NemotronH_Omni_Reasoning_V3Processor",
+            "feature_extractor": {"feature_extractor_type": "ParakeetFeatureExtractor"},
+        },
+        video=video("NemotronH_Omni_Reasoning_V3VideoProcessor"),
     ),
     "video_llama_3": Family(
         chat=CHATML,

@@ -39,6 +39,7 @@ SHARE = {
     "ovis2",
     "cohere2_vision",
     "lfm2_vl",
+    "nemotron_h_omni",
     "video_llama_3",
 }
 # What is loaded in other ways where torchvision is installed.
@@ -76,7 +77,7 @@ def test_six_families_reply_as_transformers_does(families, tmp_path):
 
 @pytest.mark.slow
 def test_all_families_reply_as_transformers_does(families, tmp_path):
-    assert len(families.FAMILIES) == 32
+    assert len(families.FAMILIES) == 33
     require(families.try_families(list(families.FAMILIES), tmp_path))
 
 

@@ -22,6 +22,7 @@ OTHERS = {
     "llava": "llava",
     "idefics3": "idefics3",
     "deepseek-vl-1.3b": "deepseek_vl",
+    "nemotron-h-omni": "nemotron_h_omni",
     "gemma3": "gemma3",
     "gemma3-line-breaks": "gemma3",
 }

@@ -1,17 +1,17 @@
 """Loading a checkpoint's processor of images and text.
 
-transformers loads a processor whole, with its part for videos, which needs torchvision. Frames are
-given as images, so that part is left out where torchvision is not installed. Images are scaled by
-PIL; a few families have no such processor. What theirs take from torchvision are a few functions on
-tensors, which are torch's own under other names. So these stand in for it, and pixels are the same
-as with it.
+transformers loads a processor whole, with its parts for videos and sounds, which need torchvision
+and librosa. Frames are given as images, so these are left out where that is not installed. Images
+are scaled by PIL; a few families have no such processor. What theirs take from torchvision are a
+few functions on tensors, which are torch's own under other names. So these stand in for it, and
+pixels are the same as with it.
 """
 
 import enum
 import platform
 import re
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from importlib import import_module
 from importlib.machinery import ModuleSpec
@@ -26,7 +26,7 @@ from PIL import Image
 from transformers import image_processing_backends
 from transformers.models.auto.image_processing_auto import IMAGE_PROCESSOR_MAPPING_NAMES
 from transformers.models.auto.processing_auto import PROCESSOR_MAPPING
-from transformers.utils import is_torchvision_available
+from transformers.utils import is_librosa_available, is_torchvision_available
 
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.reading import read_json
@@ -34,7 +34,11 @@ from model_adapters.hf.loading.checkpoint import LocatedCheckpoint, wrap_loading
 from model_adapters.hf.loading.image_processors import load_image_processor, splitting_setting
 from model_adapters.options.checkpoints import FrameScaling
 
-_VIDEO = "video_processor"
+# Parts that images do not need, and whether there is what they do.
+_OTHER_PARTS = {
+    "video_processor": is_torchvision_available,
+    "feature_extractor": is_librosa_available,
+}
 # Files that may name the processor's class, in transformers' order.
 _NAMING = ("processor_config.json", "preprocessor_config.json", "tokenizer_config.json")
 _PACKAGE = re.compile(r"Package `(\w+)` is required|requires the (\w+) library")
@@ -84,27 +88,25 @@ def _split(processor: Any, *, splitting: bool) -> None:
 
 
 def _processor_class(located: LocatedCheckpoint[Any]) -> Any:
-    """Return the class of the processor without its video part; the class that finds it out where
-    torchvision is installed, and for code of the checkpoint's own."""
+    """Return the class of the processor without what cannot be loaded of it; the class that finds
+    it out where all can, and for code of the checkpoint's own."""
     name = _class_name(located.folder)
     named = None if name is None else getattr(transformers, name, None)
     processor_class: Any = available_class(
         named or PROCESSOR_MAPPING.get(type(located.config), None)
     )
-    if (
-        is_torchvision_available()
-        or processor_class is None
-        or not hasattr(processor_class, "get_attributes")
-    ):
+    if processor_class is None or not hasattr(processor_class, "get_attributes"):
         return transformers.AutoProcessor
-    has_video = _VIDEO in processor_class.get_attributes()
-    return _without_video(processor_class) if has_video else processor_class
+    missing = {name for name, is_there in _OTHER_PARTS.items() if not is_there()}
+    if missing & {*processor_class.get_attributes()}:
+        return _without(processor_class, missing)
+    return transformers.AutoProcessor if is_torchvision_available() else processor_class
 
 
-def _without_video(processor_class: Any) -> Any:
-    """Return a processor's class that loads None for the part for videos."""
+def _without(processor_class: Any, missing: Collection[str]) -> Any:
+    """Return a processor's class that loads None for some of its parts."""
     attributes = processor_class.get_attributes()
-    left = [attribute for attribute in attributes if attribute != _VIDEO]
+    left = [attribute for attribute in attributes if attribute not in missing]
     # transformers loads what a class has by this; all else goes by the class itself.
     loaded: Any = type(
         processor_class.__name__,
@@ -112,7 +114,7 @@ def _without_video(processor_class: Any) -> Any:
         {"get_attributes": classmethod(lambda _: left)},
     )
 
-    class WithoutVideo(processor_class):
+    class WithoutParts(processor_class):
         @classmethod
         def _get_arguments_from_pretrained(cls, *args: Any, **kwargs: Any) -> list[Any]:
             parts = loaded._get_arguments_from_pretrained(*args, **kwargs)
@@ -120,12 +122,12 @@ def _without_video(processor_class: Any) -> Any:
             return [by_name.get(attribute) for attribute in attributes]
 
         def check_argument_for_proper_class(self, argument_name: str, argument: Any) -> Any:
-            if argument_name == _VIDEO and argument is None:
+            if argument_name in missing and argument is None:
                 return None
             return super().check_argument_for_proper_class(argument_name, argument)
 
-    WithoutVideo.__name__ = processor_class.__name__
-    return WithoutVideo
+    WithoutParts.__name__ = processor_class.__name__
+    return WithoutParts
 
 
 def _class_name(folder: Path) -> str | None:

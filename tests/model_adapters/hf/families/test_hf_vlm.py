@@ -24,7 +24,7 @@ from ...asking import ask, load_saved, talk_of, up_to, user
 _load = partial(load_saved, "hf-vlm")
 
 
-@pytest.mark.parametrize("name", ["llava", "idefics3", "deepseek-vl-1.3b"])
+@pytest.mark.parametrize("name", ["llava", "idefics3", "deepseek-vl-1.3b", "nemotron-h-omni"])
 def test_an_unknown_family_shares_prefixes_and_replies_as_generate(name, checkpoints, frames):
     shared, whole = _both(checkpoints[name], frames)
     check_adapter(shared)
