@@ -51,7 +51,7 @@ def rows(out: Path) -> list[dict[str, Any]]:
             {
                 "name": name,
                 "budget": memory and memory["budget"],
-                "kept": memory and memory["kept"],
+                "kept": memory and memory.get("kept"),
                 "pairs": task["pairs"]["net_pairs"],
                 "ages": task["pairs"]["by_age"],
             }

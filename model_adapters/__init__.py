@@ -9,17 +9,22 @@ its line in `built_in.py`. In another package: `docs/own-models.md`.
 from infthor_eval.formats.pictures.video import Video
 from model_adapters.backend import Backend, BackendConversation
 from model_adapters.check import CheckResult, ContractError, check_adapter, run_checks
+from model_adapters.frame_policies import with_episodes
 from model_adapters.guarded import identity_of
 from model_adapters.protocols import (
     ROLES,
     Adapter,
     ArmDelta,
+    ArmObservation,
     Batches,
     BatchModel,
     CacheCut,
     Capabilities,
     Conversation,
     Decoding,
+    Episode,
+    FramePolicy,
+    HandState,
     KeptCache,
     Mark,
     Model,
@@ -54,6 +59,7 @@ __all__ = [
     "ROLES",
     "Adapter",
     "ArmDelta",
+    "ArmObservation",
     "Backend",
     "BackendConversation",
     "BatchModel",
@@ -64,6 +70,9 @@ __all__ = [
     "ContractError",
     "Conversation",
     "Decoding",
+    "Episode",
+    "FramePolicy",
+    "HandState",
     "KeptCache",
     "Mark",
     "Model",
@@ -98,5 +107,6 @@ __all__ = [
     "run_checks",
     "switched_on",
     "switches",
+    "with_episodes",
     "wrap_request_errors",
 ]

@@ -17,7 +17,7 @@ from infthor_eval.formats.frames import FrameRef
 from infthor_eval.plugins import import_target
 from model_adapters.backend import BackendConversation
 from model_adapters.own_function import OwnFunction, read_function
-from model_adapters.protocols import Capabilities, Decoding, Model, Policy, Reply, Turn
+from model_adapters.protocols import Capabilities, Decoding, FramePolicy, Model, Reply, Turn
 from model_adapters.thinking import cut_at_stop
 
 _IMAGES, _PARTS, _ACTION = ("images", "text"), ("parts",), ("image", "instruction")
@@ -45,11 +45,11 @@ class FunctionAdapter:
         """Its parameters with defaults."""
         return self.function.options
 
-    def build(self, name: str, options: Any, seed: int) -> Model | Policy:
+    def build(self, name: str, options: Any, seed: int) -> Model | FramePolicy:
         """Return the model or the policy; the seed is not used."""
         values = dataclasses.asdict(options)
         if self.function.takes == _ACTION:
-            policy: Policy = import_target(_POLICY)(name, self.function.call, values)
+            policy: FramePolicy = import_target(_POLICY)(name, self.function.call, values)
             return policy
         return FunctionModel(name, self.function, values)
 

@@ -21,6 +21,8 @@ from model_adapters.protocols import (
     Capabilities,
     Conversation,
     Decoding,
+    Episode,
+    FramePolicy,
     Mark,
     Model,
     Notice,
@@ -51,7 +53,7 @@ class _ReplyLimits(msgspec.Struct):
     seconds: Amount | None
 
 
-def guard(name: str, adapter: Any) -> Model | Policy:
+def guard(name: str, adapter: Any) -> Model | Policy | FramePolicy:
     """Return an adapter behind a guard; it has all members of its protocol.
 
     Args:
@@ -68,8 +70,8 @@ def guard(name: str, adapter: Any) -> Model | Policy:
         raise ModelError(f"model {name}: its capabilities are {given}; make them Capabilities")
     kind: type[Any] = _GuardedPerson if hasattr(adapter, "tell") else _GuardedModel
     if hasattr(adapter, "act"):
-        kind = _GuardedPolicy
-    guarded: Model | Policy = kind(own_name, capabilities, adapter)
+        kind = _GuardedPolicy if hasattr(adapter, "begin") else _GuardedFramePolicy
+    guarded: Model | Policy | FramePolicy = kind(own_name, capabilities, adapter)
     return guarded
 
 
@@ -199,20 +201,36 @@ class _GuardedConversation:
 class _GuardedPolicy(_Guarded):
     """See `Policy`."""
 
-    def reset(self) -> None:
+    def begin(self, episode: Episode) -> None:
         """See `Policy`."""
         with wrap_request_errors(self.name):
-            self._adapter.reset()
+            self._adapter.begin(episode)
 
-    def act(self, frame: FrameRef, instruction: str) -> tuple[ArmDelta, ...]:
+    def act(self, *seen: Any) -> tuple[ArmDelta, ...]:
         """See `Policy`; what its steps hold is checked where they are executed."""
         with wrap_request_errors(self.name):
-            chunk = self._adapter.act(frame, instruction)
+            chunk = self._adapter.act(*seen)
         if not isinstance(chunk, list | tuple):
             raise ModelError(
                 f"{self.name} gives {_in_words(chunk)} for its next steps; give a tuple of ArmDelta"
             )
         return tuple(chunk)
+
+    def end(self, *, success: bool) -> None:
+        """See `Policy`."""
+        with wrap_request_errors(self.name):
+            self._adapter.end(success=success)
+
+
+class _GuardedFramePolicy(_Guarded):
+    """See `FramePolicy`."""
+
+    act = _GuardedPolicy.act
+
+    def reset(self) -> None:
+        """See `FramePolicy`."""
+        with wrap_request_errors(self.name):
+            self._adapter.reset()
 
 
 def _require_reply(name: str, reply: Any) -> Reply:

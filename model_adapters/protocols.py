@@ -333,9 +333,78 @@ class ArmDelta:
     gripper: float
 
 
+@dataclass(frozen=True)
+class Episode:
+    """What a policy is told of an episode before its first view.
+
+    Attributes:
+        name: name of the episode in its run.
+        instruction: the task in words ("pick up the mug").
+        max_steps: most steps of the arm.
+    """
+
+    name: str
+    instruction: str
+    max_steps: int
+
+
+@dataclass(frozen=True)
+class HandState:
+    """An arm's hand in the frame of the robot's base: x forward, y left, z up (right-handed).
+
+    Attributes:
+        position: of the wrist, metres.
+        rotation: about x, y and z in this order, about axes that stay (roll, pitch, yaw), radians.
+        gripper: 0 if the hand holds something, else 1 (open).
+    """
+
+    position: tuple[float, float, float]
+    rotation: tuple[float, float, float]
+    gripper: float
+
+
+@dataclass(frozen=True)
+class ArmObservation:
+    """What a policy sees and feels before its next steps.
+
+    Attributes:
+        image: the agent's view.
+        wrist: the view from its wrist; None where it was not asked for.
+        state: its hand; None where it was not asked for.
+        step: steps of the arm since the episode began.
+    """
+
+    image: FrameRef
+    wrist: FrameRef | None = None
+    state: HandState | None = None
+    step: int = 0
+
+
 @runtime_checkable
 class Policy(Subject, Protocol):
-    """A vision-language-action model that drives an arm."""
+    """A vision-language-action model that drives an arm.
+
+    Episodes follow each other; those of a thread that acts at the same time are another's.
+    """
+
+    def begin(self, episode: Episode) -> None:
+        """Begin an episode: all state of the last one is dropped, also if it was not ended."""
+
+    def act(self, observation: ArmObservation) -> tuple[ArmDelta, ...]:
+        """Return the next steps of the arm, at least one, in order.
+
+        Raises:
+            ModelError: the policy cannot act, or memory ran out.
+            DataError: a frame cannot be read.
+        """
+
+    def end(self, *, success: bool) -> None:
+        """End the episode; not called where the policy failed."""
+
+
+@runtime_checkable
+class FramePolicy(Subject, Protocol):
+    """A policy that needs a frame and the instruction alone."""
 
     def reset(self) -> None:
         """Start a new episode: drop all state of the last one."""
@@ -359,7 +428,7 @@ class Adapter(Protocol):
     Options: ClassVar[type]
 
     @classmethod
-    def build(cls, name: str, options: Any, seed: int) -> Model | Policy:
+    def build(cls, name: str, options: Any, seed: int) -> Model | Policy | FramePolicy:
         """Build the model or the policy.
 
         Args:

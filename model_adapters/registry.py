@@ -23,7 +23,7 @@ from model_adapters.functions import function_adapter
 from model_adapters.guarded import guard
 from model_adapters.options import parse, with_defaults
 from model_adapters.own_file import file_identity, load_from_file, name_in_file, names_a_file
-from model_adapters.protocols import Adapter, Model, Policy
+from model_adapters.protocols import Adapter, FramePolicy, Model, Policy
 from model_adapters.refusals import wrap_adapter_errors
 
 ENTRY_POINTS = "infthor_eval.models"
@@ -100,7 +100,7 @@ def read_options(name: str, options: Mapping[str, str]) -> Any:
     return parse(name, _options(name), options)
 
 
-def load(name: str, options: Mapping[str, str], seed: int) -> Model | Policy:
+def load(name: str, options: Mapping[str, str], seed: int) -> Model | Policy | FramePolicy:
     """Build the model or policy of this name; one that is not built in is behind a guard.
 
     Args:
@@ -126,7 +126,7 @@ def load(name: str, options: Mapping[str, str], seed: int) -> Model | Policy:
     return guard(name, model)
 
 
-def build(name: str, options: Mapping[str, str], seed: int) -> Model | Policy:
+def build(name: str, options: Mapping[str, str], seed: int) -> Model | Policy | FramePolicy:
     """Build the model or the policy of this name without checking its members; see `load`."""
     adapter = _adapter(name)
     parsed = read_options(name, options)

@@ -6,10 +6,9 @@ how `planner-arm` moves is in `planner/steps.py`.
 
 import random
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, Protocol, runtime_checkable
 
-from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.pictures.blank import blank_like
 from infthor_eval.manipulation.conversion import Call
 from infthor_eval.manipulation.environment import ArmEnvironment
@@ -17,7 +16,16 @@ from infthor_eval.manipulation.kinds import ManipulationKind
 from infthor_eval.manipulation.planner.steps import plan_steps
 from infthor_eval.runs import StoredRequest
 from infthor_eval.runs.suite import BaselineSubject
-from model_adapters import ArmDelta, Capabilities, Policy, Subject
+from model_adapters import (
+    ArmDelta,
+    ArmObservation,
+    Capabilities,
+    Episode,
+    FramePolicy,
+    Policy,
+    Subject,
+    with_episodes,
+)
 from model_adapters.refusals import check_chunk
 
 Step = ArmDelta | Sequence[Call]
@@ -27,10 +35,17 @@ _MAX_TURN = 0.17  # radians of a random turn about each axis: 10 degrees
 
 @dataclass(frozen=True)
 class ArmSituation:
-    """An episode that begins in an environment reset to it; `max_step` is in metres."""
+    """An episode that begins in an environment reset to it.
+
+    Attributes:
+        environment: the environment.
+        episode: what a policy is told of the episode.
+        seed: seed of whatever an actor draws.
+        max_step: longest step, metres.
+    """
 
     environment: ArmEnvironment
-    instruction: str
+    episode: Episode
     seed: str
     max_step: float
 
@@ -41,13 +56,16 @@ class ArmActor(Protocol):
     def begin(self, situation: ArmSituation) -> None:
         """Begin an episode."""
 
-    def act(self, frame: FrameRef | None) -> Sequence[Step]:
+    def act(self, seen: ArmObservation | None) -> Sequence[Step]:
         """Choose the next steps, to be executed in order; an empty sequence gives up.
 
         Raises:
             ModelError: a policy fails, or its result is no movement.
             DataError: the frame cannot be read.
         """
+
+    def end(self, *, success: bool) -> None:
+        """Be told that the episode is over."""
 
 
 @runtime_checkable
@@ -61,32 +79,39 @@ class ArmBaseline(Subject, Protocol):
 class PolicyActor:
     """A vision-language-action policy."""
 
-    def __init__(self, policy: Policy, *, blank: bool) -> None:
+    def __init__(self, policy: Policy | FramePolicy, *, blank: bool) -> None:
         """Take a policy; `blank` shows it grey frames instead of the actual ones."""
-        self._policy = policy
+        self._policy = with_episodes(policy)
         self._blank = blank
 
     def begin(self, situation: ArmSituation) -> None:
         """See `ArmActor`."""
-        self._instruction = situation.instruction
-        self._policy.reset()
+        self._instruction = situation.episode.instruction
+        self._policy.begin(situation.episode)
 
-    def act(self, frame: FrameRef | None) -> Sequence[Step]:
+    def act(self, seen: ArmObservation | None) -> Sequence[Step]:
         """See `ArmActor`."""
-        assert frame is not None  # frames are kept for policies
-        chunk = self._policy.act(self._seen(frame), self._instruction)
+        assert seen is not None  # frames are kept for policies
+        chunk = self._policy.act(self._shown(seen))
         check_chunk(self._policy.name, chunk)
         return chunk
 
-    def request(self, frame: FrameRef) -> StoredRequest:
+    def end(self, *, success: bool) -> None:
+        """See `ArmActor`."""
+        self._policy.end(success=success)
+
+    def request(self, seen: ArmObservation) -> StoredRequest:
         """Return the request before the first step, as the journal has it."""
         what = "frames (blank)" if self._blank else "frames"
-        return StoredRequest.of(
-            (self._seen(frame),), self._instruction, self._instruction, what=what
-        )
+        shown = self._shown(seen)
+        frames = (shown.image,) if shown.wrist is None else (shown.image, shown.wrist)
+        return StoredRequest.of(frames, self._instruction, self._instruction, what=what)
 
-    def _seen(self, frame: FrameRef) -> FrameRef:
-        return blank_like(frame) if self._blank else frame
+    def _shown(self, seen: ArmObservation) -> ArmObservation:
+        if not self._blank:
+            return seen
+        wrist = None if seen.wrist is None else blank_like(seen.wrist)
+        return replace(seen, image=blank_like(seen.image), wrist=wrist)
 
 
 class _ArmBaseline(BaselineSubject):
@@ -98,23 +123,28 @@ class _ArmBaseline(BaselineSubject):
         return self._actor()
 
 
-class _StillActor:
+class _BaselineActor:
+    def end(self, *, success: bool) -> None:
+        """Do nothing."""
+
+
+class _StillActor(_BaselineActor):
     def begin(self, situation: ArmSituation) -> None:
         environment = situation.environment
         is_pickup = environment.episode.kind == ManipulationKind.PICKUP
         take: Call = {"action": "PickupObject", "objectIdCandidates": [environment.start.object_id]}
         self._left: list[Step] = [[take if is_pickup else {"action": "ReleaseObject"}]]
 
-    def act(self, frame: FrameRef | None) -> Sequence[Step]:
+    def act(self, seen: ArmObservation | None) -> Sequence[Step]:
         return [self._left.pop()] if self._left else []
 
 
-class _RandomArmActor:
+class _RandomArmActor(_BaselineActor):
     def begin(self, situation: ArmSituation) -> None:
         self._random = random.Random(situation.seed)
         self._max_step = situation.max_step
 
-    def act(self, frame: FrameRef | None) -> Sequence[Step]:
+    def act(self, seen: ArmObservation | None) -> Sequence[Step]:
         translation = self._random_vector(self._max_step)
         rotation = self._random_vector(_MAX_TURN)
         return [ArmDelta(translation, rotation, self._random.random())]
@@ -124,11 +154,11 @@ class _RandomArmActor:
         return uniform(-most, most), uniform(-most, most), uniform(-most, most)
 
 
-class _PlannerActor:
+class _PlannerActor(_BaselineActor):
     def begin(self, situation: ArmSituation) -> None:
         self._steps = plan_steps(situation.environment)
 
-    def act(self, frame: FrameRef | None) -> Sequence[Step]:
+    def act(self, seen: ArmObservation | None) -> Sequence[Step]:
         step = next(self._steps, None)
         return [] if step is None else [step]
 

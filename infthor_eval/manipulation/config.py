@@ -16,6 +16,8 @@ class ArmTaskConfig(EpisodeTaskConfig, frozen=True, kw_only=True, omit_defaults=
         closing: when a policy's hand closes, see `Closing`; likewise.
         rules: number of the rules of success, see `SUCCESS_RULES`.
         put_criterion: when a put succeeds, see `PutCriterion`.
+        cameras: cameras of a policy with episodes; None for the agent's alone.
+        state: whether such a policy is told of its hand.
     """
 
     kind: ManipulationKind
@@ -26,6 +28,8 @@ class ArmTaskConfig(EpisodeTaskConfig, frozen=True, kw_only=True, omit_defaults=
     closing: str | None = None
     rules: int = 1
     put_criterion: PutCriterion = PutCriterion.AT_REST
+    cameras: str | None = None
+    state: bool = False
 
 
 class ManipulationConfig(

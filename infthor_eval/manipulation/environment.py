@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from infthor_eval.episodes.records import InfeasibleError
-from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.household.containment import is_in
 from infthor_eval.manipulation.conversion import Call, Conversion
@@ -24,8 +23,9 @@ from infthor_eval.manipulation.geometry import (
     size_of,
     xyz,
 )
-from infthor_eval.manipulation.kinds import Closing, Hand, ManipulationKind, Stand
+from infthor_eval.manipulation.kinds import Closing, Hand, ManipulationKind, Senses, Stand
 from infthor_eval.manipulation.records import ArmEnded
+from infthor_eval.manipulation.senses import look, observe
 from infthor_eval.manipulation.trajectories import ArmEpisode
 from infthor_eval.thor.frames import FrameKeeper
 from infthor_eval.thor.restore import restore
@@ -39,7 +39,7 @@ from infthor_eval.thor.view import (
     Vector,
     teleport_call,
 )
-from model_adapters import ArmDelta
+from model_adapters import ArmDelta, ArmObservation
 
 SUCCESS_RULES = 1  # part of a run's identity: another number when the code gives other successes
 _MAX_WAITS = 20  # until a released object lies still
@@ -78,7 +78,7 @@ class ArmOutcome:
 
     Attributes:
         view: the world after it.
-        frame: frame that the agent sees; None if frames are not kept.
+        observation: what a policy is told; None if frames are not kept.
         calls: calls of the simulator.
         refusals: messages of the simulator on calls that it refused (collisions, an empty grasp).
         distance: metres from the centre of the hand's sphere to the target's box.
@@ -86,7 +86,7 @@ class ArmOutcome:
     """
 
     view: SimulatorView
-    frame: FrameRef | None
+    observation: ArmObservation | None
     calls: tuple[Call, ...] = ()
     refusals: tuple[str, ...] = ()
     distance: float = 0.0
@@ -106,14 +106,22 @@ class ArmEnvironment:
     start: EpisodeStart
     starts_inside: bool
 
-    def __init__(self, trajectory: Trajectory, simulator: Simulator) -> None:
+    def __init__(
+        self, trajectory: Trajectory, simulator: Simulator, senses: Senses | None = None
+    ) -> None:
         """Restore the scene of a trajectory in a simulator of an agent with an arm.
+
+        Args:
+            trajectory: the trajectory.
+            simulator: the simulator.
+            senses: what a policy is told beside its view; nothing where None.
 
         Raises:
             SceneError: the simulator has no such scene.
             SimulatorError: the simulator fails.
         """
         self._simulator = simulator
+        self._senses = senses or Senses()
         restore(simulator, trajectory.scene)
         self._initial = simulator.mark()
         self._is_over = True
@@ -161,7 +169,8 @@ class ArmEnvironment:
         view = self._require({"action": "SetHandSphereRadius", "radius": grasp.radius})
         self.starts_inside = start.object_id in arm_of(view).pickupable
         self._is_over = False
-        return ArmOutcome(view, self._frames.keep(view), distance=self._distance(view))
+        self._n_steps = 0
+        return self._outcome()
 
     def step(self, action: ArmDelta | Sequence[Call]) -> ArmOutcome:
         """Execute one step.
@@ -185,15 +194,18 @@ class ArmEnvironment:
         released = any(call["action"] == "ReleaseObject" for call in calls)
         ended = self._ending(released)
         self._is_over = ended is not None
-        view = self._simulator.view
-        return ArmOutcome(
-            view,
-            self._frames.keep(view),
-            tuple(calls),
-            tuple(refusals),
-            self._distance(view),
-            ended,
-        )
+        self._n_steps += 1
+        return self._outcome(tuple(calls), tuple(refusals), ended)
+
+    def _outcome(
+        self,
+        calls: tuple[Call, ...] = (),
+        refusals: tuple[str, ...] = (),
+        ended: ArmEnded | None = None,
+    ) -> ArmOutcome:
+        view = look(self._senses, self._simulator)
+        seen = observe(self._senses, view, self._n_steps, self._frames)
+        return ArmOutcome(view, seen, calls, refusals, self._distance(view), ended)
 
     @property
     def view(self) -> SimulatorView:

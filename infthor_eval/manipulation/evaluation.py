@@ -10,13 +10,13 @@ from infthor_eval.episodes.evaluation import BoundEpisodes, EpisodeEvaluation, E
 from infthor_eval.episodes.retries import with_retries
 from infthor_eval.episodes.running import EpisodeResult, EpisodeRunner
 from infthor_eval.episodes.simulators import Simulators
-from infthor_eval.errors import SceneError
+from infthor_eval.errors import SceneError, UsageError
 from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.manipulation.actors import ArmActor, ArmBaseline, ArmSituation, PolicyActor, Step
 from infthor_eval.manipulation.config import ManipulationConfig
 from infthor_eval.manipulation.environment import ArmEnvironment, ArmOutcome, arm_of
 from infthor_eval.manipulation.expert import ExpertStates, replay_expert
-from infthor_eval.manipulation.kinds import PutCriterion
+from infthor_eval.manipulation.kinds import PutCriterion, Senses
 from infthor_eval.manipulation.options import ManipulationOptions
 from infthor_eval.manipulation.records import ArmEnded, ArmRecord, ArmStep
 from infthor_eval.manipulation.task import ManipulationTask
@@ -25,7 +25,7 @@ from infthor_eval.runs import Group, RunHeader, Session, TaskRequest, UnitDoc, U
 from infthor_eval.storage.scratch import ScratchFolder
 from infthor_eval.thor.frames import FrameFolder, FrameKeeper, NoFrames
 from infthor_eval.thor.simulator import Simulator
-from model_adapters import ArmDelta, Policy, Subject
+from model_adapters import ArmDelta, Episode, FramePolicy, Policy, Subject
 
 ArmUnit = EpisodeUnit[ArmRecord, ArmTrajectory, ArmEpisode]
 _Camera = tuple[int, float]  # see `ArmTaskSettings.camera`
@@ -54,13 +54,18 @@ class ManipulationEvaluation(EpisodeEvaluation[ManipulationOptions, Manipulation
 
     def bind(self, subject: Subject) -> "BoundManipulation":
         """See `runs.Evaluation.bind`; TypeError for neither a policy nor an arm's baseline."""
+        if self.options.senses != Senses() and not isinstance(subject, Policy):
+            raise UsageError(
+                f"{subject.name} takes no more than a frame and an instruction; leave --cameras "
+                "and --state out"
+            )
         if isinstance(subject, ArmBaseline):
             create_actor: Callable[[], ArmActor] = subject.arm_actor
-        elif isinstance(subject, Policy):
+        elif isinstance(subject, Policy | FramePolicy):
             create_actor = partial(PolicyActor, subject, blank=self.options.frames == "blank")
         else:
             raise TypeError(f"{subject} is neither a policy nor a baseline of manipulation")
-        return BoundManipulation(self, create_actor, sees=isinstance(subject, Policy))
+        return BoundManipulation(self, create_actor, sees=not isinstance(subject, ArmBaseline))
 
     def to_doc(
         self, header: RunHeader[ManipulationConfig], record: UnitRecord[ArmRecord]
@@ -92,6 +97,7 @@ class BoundManipulation(BoundEpisodes[ArmUnit, ArmRecord]):
         self._tasks = evaluation.tasks
         self._create_actor = create_actor
         self._sees = sees
+        self._senses = evaluation.options.senses
         self._experts = evaluation.simulators(image=False, instances=False)
         by_camera = {
             task.settings.camera: task.settings.camera_options for task in self._tasks.values()
@@ -142,7 +148,12 @@ class BoundManipulation(BoundEpisodes[ArmUnit, ArmRecord]):
             return
         with arms.one() as simulator:
             runner = ArmRunner(
-                trajectory, states, simulator, self._create_actor(), sees=self._sees, seed=self.seed
+                trajectory,
+                states,
+                simulator,
+                self._create_actor(),
+                senses=self._senses if self._sees else None,
+                seed=self.seed,
             )
             for unit in units:
                 run = partial(runner.run, self._tasks[unit.key.task], unit.episode)
@@ -172,14 +183,15 @@ class ArmRunner(EpisodeRunner[ArmEnvironment, ArmRecord]):
         simulator: Simulator,
         actor: ArmActor,
         *,
-        sees: bool,
+        senses: Senses | None,
         seed: int,
     ) -> None:
-        """Take a trajectory, the states that its episodes begin in, and a simulator with an arm."""
-        super().__init__(simulator, lambda: ArmEnvironment(trajectory, simulator))
+        """Take a trajectory, the states that its episodes begin in, and a simulator with an arm; no
+        senses if the actor looks at nothing."""
+        super().__init__(simulator, lambda: ArmEnvironment(trajectory, simulator, senses))
         self._states = states
         self._actor = actor
-        self._sees = sees
+        self._sees = senses is not None
         self._seed = f"{seed}/{trajectory.traj_id}"
 
     def run(self, task: ManipulationTask, episode: ArmEpisode) -> EpisodeResult[ArmRecord]:
@@ -198,16 +210,16 @@ class ArmRunner(EpisodeRunner[ArmEnvironment, ArmRecord]):
                 start_distance=round(outcome.distance, _DIGITS),
             )
             seed = f"{self._seed}/{task.name}/{episode.index}"
-            self._actor.begin(
-                ArmSituation(environment, self.begun.instruction, seed, task.settings.max_step)
-            )
-            if isinstance(self._actor, PolicyActor) and outcome.frame is not None:
-                self.request = self._actor.request(outcome.frame)
+            told = Episode(seed, self.begun.instruction, task.settings.max_steps)
+            self._actor.begin(ArmSituation(environment, told, seed, task.settings.max_step))
+            if isinstance(self._actor, PolicyActor) and outcome.observation is not None:
+                self.request = self._actor.request(outcome.observation)
             steps, ended = self._act(environment, outcome, task.settings.max_steps)
-        closest = min([outcome.distance, *(step.distance for step in steps)])
-        record = msgspec.structs.replace(
-            self.begun, steps=tuple(steps), closest=round(closest, _DIGITS), ended=str(ended)
-        )
+            closest = min([outcome.distance, *(step.distance for step in steps)])
+            record = msgspec.structs.replace(
+                self.begun, steps=tuple(steps), closest=round(closest, _DIGITS), ended=str(ended)
+            )
+            self._actor.end(success=record.done)
         reward = task.settings.reward if record.done else 0.0
         return EpisodeResult(msgspec.structs.replace(record, reward=reward))
 
@@ -225,7 +237,7 @@ class ArmRunner(EpisodeRunner[ArmEnvironment, ArmRecord]):
                     outcome = environment.step(closing)
                     steps.append(_arm_step(closing, outcome))
                 return steps, outcome.ended or ArmEnded.LIMIT
-            chunk = chunk or list(self._actor.act(outcome.frame))
+            chunk = chunk or list(self._actor.act(outcome.observation))
             if not chunk:
                 return steps, ArmEnded.GAVE_UP
             step = chunk.pop(0)

@@ -3,6 +3,7 @@
 What the paper does not say of its protocol can be set (docs/manipulation.md).
 """
 
+from dataclasses import dataclass
 from enum import StrEnum
 
 
@@ -45,3 +46,16 @@ class Hand(StrEnum):
     REST = "rest"
     LOW = "low"
     HIGH = "high"
+
+
+@dataclass(frozen=True)
+class Senses:
+    """What a policy with episodes is told beside its view.
+
+    Attributes:
+        wrist: whether there is a camera at the wrist, which looks where the hand points.
+        state: whether it is told where its hand is, and whether it holds something.
+    """
+
+    wrist: bool = False
+    state: bool = False

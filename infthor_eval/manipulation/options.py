@@ -6,7 +6,7 @@ from typing import Annotated
 from msgspec import Meta
 
 from infthor_eval.episodes.options import SimulatorOptions
-from infthor_eval.manipulation.kinds import Closing, Hand, PutCriterion, Stand
+from infthor_eval.manipulation.kinds import Closing, Hand, PutCriterion, Senses, Stand
 from infthor_eval.settings import Setting
 
 # Settings of task files that are options too; one that is not given is the task's own.
@@ -60,6 +60,15 @@ Instruction = Annotated[
 ]
 
 
+Cameras = Annotated[
+    str,
+    Setting(
+        help="Cameras that a policy with episodes sees by: the agent's, and one at the wrist.",
+        choices=("front", "front,wrist"),
+    ),
+]
+
+
 @dataclass(frozen=True, kw_only=True)
 class ManipulationOptions(SimulatorOptions):
     """Options of a run; None is the task's own."""
@@ -70,3 +79,12 @@ class ManipulationOptions(SimulatorOptions):
     closing: ClosingName | None = None
     put_criterion: PutCriterionName | None = None
     instruction: Instruction | None = None
+    cameras: Cameras = "front"
+    state: Annotated[
+        bool, Setting(help="Tell a policy with episodes where its hand is, and what it holds.")
+    ] = False
+
+    @property
+    def senses(self) -> Senses:
+        """What a policy is told beside its view."""
+        return Senses(wrist="wrist" in self.cameras, state=self.state)

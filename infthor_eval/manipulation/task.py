@@ -152,6 +152,7 @@ class ManipulationTask(EpisodeTask[ArmTaskSettings, ArmTrajectory]):
     def __init__(self, file: TaskFile, request: TaskRequest[ManipulationOptions]) -> None:
         """Check the file and find its episodes."""
         file.require("dataset_kwargs")
+        self._options = request.options
         settings = with_options(task_settings(file, ArmTaskSettings), request.options)
         self.kind = ManipulationKind(settings.kind)
         self._template = (
@@ -193,6 +194,8 @@ class ManipulationTask(EpisodeTask[ArmTaskSettings, ArmTrajectory]):
             closing=self.settings.closing,
             rules=SUCCESS_RULES,
             put_criterion=PutCriterion(self.settings.put_criterion),
+            cameras=self._options.cameras if self._options.senses.wrist else None,
+            state=self._options.state,
         )
 
     def _check_instruction(self, name: str) -> None:

@@ -3,6 +3,9 @@
 from pathlib import Path
 from typing import Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
 from infthor_eval.errors import SimulatorError, wrap_errors
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.pictures.png import write_png
@@ -21,11 +24,18 @@ class FrameKeeper(Protocol):
             DataError: the frame cannot be written.
         """
 
+    def keep_from(self, camera: int, view: SimulatorView) -> FrameRef | None:
+        """Store the frame of a third-party camera, likewise."""
+
 
 class NoFrames:
     """Frames of agents without vision: none is stored."""
 
     def keep(self, view: SimulatorView) -> FrameRef | None:
+        """Return None."""
+        return None
+
+    def keep_from(self, camera: int, view: SimulatorView) -> FrameRef | None:
         """Return None."""
         return None
 
@@ -41,8 +51,15 @@ class FrameFolder:
         """See `FrameKeeper`."""
         if view.frame is None:
             raise SimulatorError("the simulator sent no frame; start it with rendering on")
+        return self._write(view.frame)
+
+    def keep_from(self, camera: int, view: SimulatorView) -> FrameRef | None:
+        """See `FrameKeeper`."""
+        return self._write(view.third_party[camera])
+
+    def _write(self, frame: NDArray[np.uint8]) -> FrameRef:
         path = self._folder / f"{self._n_frames:09d}.png"
         self._n_frames += 1
         with wrap_errors(f"{path}: cannot be written", writing_hint(", or set TMPDIR")):
-            write_png(path, view.frame, level=1)  # temporary: speed matters more than size
+            write_png(path, frame, level=1)  # temporary: speed matters more than size
         return FrameRef(path)

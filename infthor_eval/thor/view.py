@@ -1,5 +1,6 @@
 """Typed metadata that the simulator reports after an action, and the call back to a pose."""
 
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
@@ -193,6 +194,7 @@ class SimulatorView:
         segmentation: which object each pixel shows; None likewise.
         arm: arm of the agent; None if it has none.
         camera: the agent's; None where a simulator does not report it.
+        third_party: frames of the third-party cameras, like `frame`, by their ids.
         image_digest: what the frame shows, whether it is rendered or not; None where it was not
             asked for.
     """
@@ -211,6 +213,7 @@ class SimulatorView:
     segmentation: Segmentation | None = None
     arm: ArmState | None = None
     camera: Camera | None = None
+    third_party: Sequence[NDArray[np.uint8]] = ()
     image_digest: str | None = None
 
 
@@ -254,6 +257,7 @@ def view_of(event: Any) -> SimulatorView:
     segmentation = segmentation_of(event)
     return SimulatorView(
         frame=None if event.frame is None else np.ascontiguousarray(event.frame),
+        third_party=[np.ascontiguousarray(frame) for frame in event.third_party_camera_frames],
         depth=None if event.depth_frame is None else np.ascontiguousarray(event.depth_frame),
         objects={obj.object_id: obj for obj in objects},
         agent=agent,

@@ -9,7 +9,15 @@ from PIL import Image
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.storage.digests import json_values
 from infthor_eval.storage.scratch import ScratchFolder
-from model_adapters.protocols import Conversation, Decoding, Model, Part, Policy, Reply
+from model_adapters.protocols import (
+    Conversation,
+    Decoding,
+    FramePolicy,
+    Model,
+    Part,
+    Policy,
+    Reply,
+)
 
 NEW_TOKENS = 8
 GREEDY = Decoding(max_new_tokens=NEW_TOKENS)
@@ -43,13 +51,13 @@ def check_members(adapter: Any) -> None:
     An object with `act` counts as a policy, any other as a model.
     """
     if hasattr(adapter, "act"):
-        _require_members(adapter, Policy)
+        _require_members(adapter, Policy if hasattr(adapter, "begin") else FramePolicy)
     else:
         _require_members(adapter, Model)
         _require_members(adapter.conversation(), Conversation)
 
 
-def check_identity(adapter: Model | Policy) -> None:
+def check_identity(adapter: Model | Policy | FramePolicy) -> None:
     """Check name, identity and capabilities; `ContractError` for a clause that does not hold."""
     check_identity_values(adapter.identity)
     require(bool(adapter.name), "the name is empty")

@@ -27,7 +27,20 @@ from model_adapters.check.clauses import (
     start_conversation,
 )
 from model_adapters.check.results import CheckResult, run_each
-from model_adapters.protocols import ArmDelta, Conversation, Decoding, Model, Part, Policy, Reply
+from model_adapters.frame_policies import with_episodes
+from model_adapters.protocols import (
+    ArmDelta,
+    ArmObservation,
+    Conversation,
+    Decoding,
+    Episode,
+    FramePolicy,
+    HandState,
+    Model,
+    Part,
+    Policy,
+    Reply,
+)
 
 _MOST_THREADS = 4
 _CHOICES = ("bright", "dark", "dark and bright")  # one is a prefix of another
@@ -35,7 +48,9 @@ _INSTRUCTION = "pick up the mug"
 _TEXTS = ("A black picture.", "A white picture.")
 
 
-def check_adapter(adapter: Model | Policy, frame_size: tuple[int, int] = (300, 300)) -> None:
+def check_adapter(
+    adapter: Model | Policy | FramePolicy, frame_size: tuple[int, int] = (300, 300)
+) -> None:
     """Check a model or a policy against its contract, as far as its capabilities go.
 
     The adapter answers a few dozen short questions on frames of one colour.
@@ -53,7 +68,7 @@ def check_adapter(adapter: Model | Policy, frame_size: tuple[int, int] = (300, 3
 
 
 def run_checks(
-    adapter: Model | Policy, frame_size: tuple[int, int] = (300, 300)
+    adapter: Model | Policy | FramePolicy, frame_size: tuple[int, int] = (300, 300)
 ) -> Iterator[CheckResult]:
     """Run all checks of `check_adapter`, also after a violation; only a missing member ends them.
 
@@ -66,10 +81,10 @@ def run_checks(
 
 
 def _checks(
-    adapter: Model | Policy, black: FrameRef, white: FrameRef
+    adapter: Model | Policy | FramePolicy, black: FrameRef, white: FrameRef
 ) -> dict[str, Callable[[], None]]:
     if hasattr(adapter, "act"):
-        return policy_checks(cast(Policy, adapter), black, white)
+        return policy_checks(cast(Policy | FramePolicy, adapter), black, white)
     return model_checks(adapter, black, white)
 
 
@@ -300,7 +315,7 @@ def _alike(model: Model, one: Conversation, other: Conversation) -> bool:
 
 
 def policy_checks(
-    policy: Policy, black: FrameRef, white: FrameRef
+    policy: Policy | FramePolicy, black: FrameRef, white: FrameRef
 ) -> dict[str, Callable[[], None]]:
     """Return all checks of a policy by name; each raises `ContractError` for a broken clause."""
     return {
@@ -310,17 +325,32 @@ def policy_checks(
     }
 
 
-def _check_episodes(policy: Policy, frames: tuple[FrameRef, ...]) -> None:
-    episodes = [_run_episode(policy, frames) for _ in range(2)]
-    alike = episodes[0] == episodes[1] or not policy.capabilities.deterministic
-    require(alike, "after reset() the same frames do not give the same actions")
+def _check_episodes(policy: Policy | FramePolicy, frames: tuple[FrameRef, ...]) -> None:
+    """Check that an episode is the same alone, again, and after another one."""
+    acting = with_episodes(policy)
+    alone = _run_episode(acting, _INSTRUCTION, frames)
+    again = _run_episode(acting, _INSTRUCTION, frames)
+    _run_episode(acting, "put the bowl in the sink", (*frames[::-1], *frames))
+    after = _run_episode(acting, _INSTRUCTION, frames)
+    if policy.capabilities.deterministic:
+        require(alone == again, "the same episode again does not have the same actions")
+        require(
+            alone == after,
+            "an episode after another does not have the actions that it has alone: something of "
+            "the other is left when it begins",
+        )
 
 
-def _run_episode(policy: Policy, frames: tuple[FrameRef, ...]) -> list[tuple[ArmDelta, ...]]:
-    policy.reset()
-    chunks = [policy.act(frame, _INSTRUCTION) for frame in frames]
-    for chunk in chunks:
-        _check_chunk(chunk)
+def _run_episode(
+    policy: Policy, instruction: str, frames: tuple[FrameRef, ...]
+) -> list[tuple[ArmDelta, ...]]:
+    policy.begin(Episode("check", instruction, len(frames)))
+    chunks = []
+    for step, frame in enumerate(frames):
+        state = HandState((0.4, 0.0, 0.3), (0.0, 0.0, 0.0), 1.0)
+        chunks.append(policy.act(ArmObservation(frame, frame, state, step)))
+        _check_chunk(chunks[-1])
+    policy.end(success=False)
     return chunks
 
 

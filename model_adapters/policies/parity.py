@@ -12,9 +12,10 @@ from infthor_eval.errors import DataError, UsageError
 from infthor_eval.formats.frames import FrameRef, find_images
 from infthor_eval.storage.scratch import ScratchFolder
 from infthor_eval.tables import Column, Row, Table
+from model_adapters.frame_policies import with_episodes
 from model_adapters.options.policies import VlaHttpOptions
 from model_adapters.policies.http.adapter import HttpPolicy
-from model_adapters.protocols import ArmDelta, Policy
+from model_adapters.protocols import ArmDelta, ArmObservation, Episode, FramePolicy, Policy
 from model_adapters.refusals import check_chunk
 from model_adapters.registry import has_option, load
 
@@ -69,11 +70,11 @@ class ParityReport:
         )
 
 
-def load_policy(name: str, options: Mapping[str, str]) -> Policy:
+def load_policy(name: str, options: Mapping[str, str]) -> Policy | FramePolicy:
     """Load the policy to compare; chunks are not averaged unless the options say so."""
     defaults = {"ensemble": "none"} if has_option(name, "ensemble") else {}
     policy = load(name, {**defaults, **options}, seed=0)
-    if not isinstance(policy, Policy):
+    if not isinstance(policy, Policy | FramePolicy):
         policy.close()
         raise UsageError(f"{name} is not a policy; compare openvla or spatialvla")
     return policy
@@ -88,14 +89,15 @@ def reference_policy(url: str, unnorm_key: str | None) -> HttpPolicy:
 
 
 def compare_policies(
-    ours: Policy,
-    theirs: Policy,
+    ours: Policy | FramePolicy,
+    theirs: Policy | FramePolicy,
     frames: Sequence[FrameRef],
     instructions: Sequence[str],
     tolerance: float,
 ) -> ParityReport:
     """Compare both's actions on the same frames and instructions, each the first of an episode."""
-    rows = tuple(_row(ours, theirs, frames, instruction) for instruction in instructions)
+    both = with_episodes(ours), with_episodes(theirs)
+    rows = tuple(_row(*both, frames, instruction) for instruction in instructions)
     return ParityReport(ours.name, rows, tolerance)
 
 
@@ -124,9 +126,10 @@ def _row(ours: Policy, theirs: Policy, frames: Sequence[FrameRef], instruction: 
     differences = []
     n_steps = (0, 0)
     for frame in frames:
-        ours.reset()
-        theirs.reset()
-        pair = ours.act(frame, instruction), theirs.act(frame, instruction)
+        for policy in (ours, theirs):
+            policy.begin(Episode("parity", instruction, 1))
+        observation = ArmObservation(frame)
+        pair = ours.act(observation), theirs.act(observation)
         for policy, chunk in zip((ours, theirs), pair, strict=True):
             check_chunk(policy.name, chunk)  # NaN would count as equal
         n_steps = len(pair[0]), len(pair[1])

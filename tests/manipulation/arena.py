@@ -38,9 +38,13 @@ class _AnyActor:
         assert self.actor is not None
         self.actor.begin(situation)
 
-    def act(self, frame: Any) -> Sequence[Step]:
+    def act(self, seen: Any) -> Sequence[Step]:
         assert self.actor is not None
-        return self.actor.act(frame)
+        return self.actor.act(seen)
+
+    def end(self, *, success: bool) -> None:
+        assert self.actor is not None
+        self.actor.end(success=success)
 
 
 class Arena:
@@ -86,5 +90,5 @@ class Arena:
 
     def _runner(self, seed: int) -> ArmRunner:
         return ArmRunner(
-            self.trajectory, self.states, self.simulator, self._any_actor, sees=False, seed=seed
+            self.trajectory, self.states, self.simulator, self._any_actor, senses=None, seed=seed
         )

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 from infthor_eval.formats.frames import FrameRef
-from model_adapters import Capabilities
+from model_adapters import ArmDelta, ArmObservation, Capabilities, Episode
 
 
 class ScriptedPolicy:
@@ -35,6 +35,39 @@ class ScriptedPolicy:
         self.seen.append(frame.path.read_bytes())
         self.instructions.append(instruction)
         return self._gives(len(self.instructions) - 1 - self.resets[-1])
+
+    def close(self) -> None:
+        """Nothing is held."""
+
+
+class EpisodesPolicy:
+    """Has its hand move ahead and up, and turn; keeps what it is told.
+
+    Attributes:
+        episodes: episodes, each with its observations and how it ended.
+        pixels: digests of the views, and of those from the wrist.
+    """
+
+    name = "episodes-policy"
+    capabilities = Capabilities(counts_tokens=False, token_ids=False)
+
+    def __init__(self) -> None:
+        self.episodes: list[tuple[Episode, list[ArmObservation], list[bool]]] = []
+        self.pixels: list[tuple[str, str | None]] = []
+
+    def identity(self) -> dict[str, Any]:
+        return {}
+
+    def begin(self, episode: Episode) -> None:
+        self.episodes.append((episode, [], []))
+
+    def act(self, seen: ArmObservation) -> tuple[ArmDelta, ...]:
+        self.episodes[-1][1].append(seen)
+        self.pixels.append((seen.image.digest, seen.wrist and seen.wrist.digest))
+        return (ArmDelta((0.02, 0.01, 0.03), (0.0, 0.1, 0.2), 1.0),)
+
+    def end(self, *, success: bool) -> None:
+        self.episodes[-1][2].append(success)
 
     def close(self) -> None:
         """Nothing is held."""

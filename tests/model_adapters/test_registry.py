@@ -11,7 +11,7 @@ import pytest
 from infthor_eval.errors import ModelError, UsageError
 from model_adapters import (
     Capabilities,
-    Policy,
+    FramePolicy,
     adapter_identity,
     label,
     load,
@@ -125,7 +125,7 @@ def test_models_of_other_packages_come_through_entry_points(monkeypatch):
     _import_as_outside(monkeypatch, Outside)
     model = load("outside", {"sure": "yes"}, 7)
     assert "outside" in names()
-    assert isinstance(model, Policy)
+    assert isinstance(model, FramePolicy)
     assert (model.name, model.sure, model.seed) == ("outside", True, 7)
 
 

@@ -21,11 +21,20 @@ from infthor_eval.runs.suite import BoundEvaluation, Group, Need, Session, Suite
 from infthor_eval.storage.deadlines import limit_by
 from infthor_eval.storage.limits import OWN_CODE_SECONDS
 from infthor_eval.workers import WorkerSettings
-from model_adapters import BatchModel, Model, Policy, Subject, adapter_identity, identity_of, load
+from model_adapters import (
+    BatchModel,
+    FramePolicy,
+    Model,
+    Policy,
+    Subject,
+    adapter_identity,
+    identity_of,
+    load,
+)
 
-_NEEDED: dict[Need, tuple[type, str]] = {
+_NEEDED: dict[Need, tuple[Any, str]] = {
     "conversation": (Model, "a model that answers in words"),
-    "policy": (Policy, "a policy that drives an arm (openvla, spatialvla, ...)"),
+    "policy": (Policy | FramePolicy, "a policy that drives an arm (openvla, spatialvla, ...)"),
 }
 
 

@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from infthor_eval.errors import DataError, InfthorError, ModelError, UsageError
-from model_adapters import Policy, check_adapter, load, options_of
+from model_adapters import FramePolicy, check_adapter, load, options_of
 
 from ...helpers.refusals import read_one_line
 from ..asking import load_saved
@@ -23,7 +23,7 @@ def tiny():
 
 @pytest.mark.parametrize("name", NAMES)
 def test_the_twins_keep_the_contract(name, tiny):
-    assert isinstance(tiny[name], Policy)
+    assert isinstance(tiny[name], FramePolicy)
     check_adapter(tiny[name])
     check_adapter(tiny[name], frame_size=(320, 240))
 

@@ -7,7 +7,7 @@ import pytest
 
 from infthor_eval.errors import DataError, ModelError, UsageError
 from infthor_eval.formats.frames import FrameRef
-from model_adapters import ArmDelta, Policy, check_adapter, check_options
+from model_adapters import ArmDelta, FramePolicy, check_adapter, check_options
 from model_adapters.options.policies import PolicyOptions
 from model_adapters.policies.policy import ExponentialEnsemble, VlaPolicy, arm_deltas
 from model_adapters.policies.statistics import ActionStatistics
@@ -40,7 +40,7 @@ STEP = [0.5, -0.5, 0.0, 0.1, 0.2, 0.3, 1.0]
 
 def test_actions_are_scaled_and_come_as_steps(plain_frames):
     policy = _policy([STEP])
-    assert isinstance(policy, Policy)
+    assert isinstance(policy, FramePolicy)
     (step,) = policy.act(plain_frames[0], "pick up the mug")
     assert step.translation == pytest.approx((1.0, -1.0, 0.0))
     assert step.rotation == pytest.approx((0.2, 0.4, 0.6))
