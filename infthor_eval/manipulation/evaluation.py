@@ -7,7 +7,6 @@ from functools import partial
 import msgspec
 
 from infthor_eval.episodes.evaluation import BoundEpisodes, EpisodeEvaluation, EpisodeUnit
-from infthor_eval.episodes.retries import with_retries
 from infthor_eval.episodes.running import EpisodeResult, EpisodeRunner
 from infthor_eval.episodes.simulators import Simulators
 from infthor_eval.errors import SceneError, UsageError
@@ -15,10 +14,11 @@ from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.manipulation.actors import ArmActor, ArmBaseline, ArmSituation, PolicyActor, Step
 from infthor_eval.manipulation.config import ManipulationConfig
 from infthor_eval.manipulation.environment import ArmEnvironment, ArmOutcome, arm_of
-from infthor_eval.manipulation.expert import ExpertStates, replay_expert
+from infthor_eval.manipulation.expert import ExpertStates
 from infthor_eval.manipulation.kinds import PutCriterion, Senses
 from infthor_eval.manipulation.options import ManipulationOptions
 from infthor_eval.manipulation.records import ArmEnded, ArmRecord, ArmStep
+from infthor_eval.manipulation.simulators import ArmSimulators
 from infthor_eval.manipulation.task import ManipulationTask
 from infthor_eval.manipulation.trajectories import ArmEpisode, ArmTrajectory
 from infthor_eval.runs import Group, RunHeader, Session, TaskRequest, UnitDoc, UnitKey, UnitRecord
@@ -28,7 +28,6 @@ from infthor_eval.thor.simulator import Simulator
 from model_adapters import ArmDelta, Episode, FramePolicy, Policy, Subject
 
 ArmUnit = EpisodeUnit[ArmRecord, ArmTrajectory, ArmEpisode]
-_Camera = tuple[int, float]  # see `ArmTaskSettings.camera`
 _DIGITS = 6  # of metres and rewards; more would be rounding noise
 
 
@@ -98,14 +97,9 @@ class BoundManipulation(BoundEpisodes[ArmUnit, ArmRecord]):
         self._create_actor = create_actor
         self._sees = sees
         self._senses = evaluation.options.senses
-        self._experts = evaluation.simulators(image=False, instances=False)
-        by_camera = {
-            task.settings.camera: task.settings.camera_options for task in self._tasks.values()
-        }
-        self._arms = {
-            camera: evaluation.simulators(image=sees, instances=False, agentMode="arm", **options)
-            for camera, options in by_camera.items()
-        }
+        self._simulators = ArmSimulators(
+            evaluation.simulators, (task.settings for task in self._tasks.values()), image=sees
+        )
         # The episodes of all tasks by trajectory, in time order: one replay of its expert serves
         # them all.
         by_trajectory: dict[str, list[ArmUnit]] = {unit.cluster: [] for unit in evaluation.units}
@@ -114,7 +108,7 @@ class BoundManipulation(BoundEpisodes[ArmUnit, ArmRecord]):
         super().__init__(
             evaluation,
             evaluation.workload(by_trajectory.values()),
-            [self._experts, *self._arms.values()],
+            self._simulators.all,
         )
 
     def run(
@@ -123,12 +117,13 @@ class BoundManipulation(BoundEpisodes[ArmUnit, ArmRecord]):
         """See `infthor_eval.runs.BoundEvaluation.run`."""
         fingerprints, known = self._find_records(group, session)
         yield from (record for record in known.values() if record is not None)
-        by_camera: dict[_Camera, list[ArmUnit]] = {}
+        by_camera: dict[Simulators, list[ArmUnit]] = {}
         for unit in group.units:
             if known[unit.key] is None:
-                by_camera.setdefault(self._tasks[unit.key.task].settings.camera, []).append(unit)
-        for camera, units in by_camera.items():
-            yield from self._run_episodes(units, fingerprints, self._arms[camera], session)
+                arms = self._simulators.with_arm(self._tasks[unit.key.task].settings)
+                by_camera.setdefault(arms, []).append(unit)
+        for arms, units in by_camera.items():
+            yield from self._run_episodes(units, fingerprints, arms, session)
 
     def _run_episodes(
         self,
@@ -139,10 +134,7 @@ class BoundManipulation(BoundEpisodes[ArmUnit, ArmRecord]):
     ) -> Iterator[UnitRecord[ArmRecord]]:
         trajectory = units[0].trajectory.data
         try:
-            with self._experts.one() as expert:
-                states, faults = with_retries(
-                    expert, lambda: replay_expert(trajectory, expert), lambda: None
-                )
+            states, faults = self._simulators.expert_states(trajectory)
         except SceneError as error:
             yield from (unit.record_exclusion(str(error), fingerprints[unit.key]) for unit in units)
             return

@@ -16,7 +16,7 @@ from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import ArmState, SimulatorView
 from model_adapters import ArmObservation, HandState
 
-_WRIST = 0  # id of the third-party camera
+WRIST = 0  # id of the third-party camera
 
 
 def look(senses: Senses, simulator: Simulator) -> SimulatorView:
@@ -38,7 +38,7 @@ def observe(
     image = frames.keep(view)
     if image is None or view.arm is None:
         return None
-    wrist = frames.keep_from(_WRIST, view) if senses.wrist else None
+    wrist = frames.keep_from(WRIST, view) if senses.wrist else None
     return ArmObservation(image, wrist, hand_state(view.arm) if senses.state else None, step)
 
 
