@@ -7,7 +7,8 @@ import math
 from typing import Any
 
 import numpy as np
-from inspect_robots import embodiment, spaces
+from inspect_robots import spaces
+from inspect_robots.embodiment import PRIVILEGED_SUCCESS, RENDERABLE, RESETTABLE, EmbodimentInfo
 from inspect_robots.errors import ConfigError, PolicyError
 from inspect_robots.scene import Scene
 from inspect_robots.scorer import success_at_end
@@ -35,9 +36,7 @@ _STATE = spaces.StateSpec(
         spaces.StateField("gripper", (1,), "normalized"),
     )
 )
-_CAPABILITIES = frozenset(
-    {embodiment.RESETTABLE, embodiment.PRIVILEGED_SUCCESS, embodiment.RENDERABLE}
-)
+_CAPABILITIES = frozenset({RESETTABLE, PRIVILEGED_SUCCESS, RENDERABLE})
 _DOCS = (
     "The hand moves in the frame of the robot's base: x forward, y left, z up, in metres and "
     "radians; a movement is at most 0.1 m long. The gripper is absolute: below 0.5 it closes "
@@ -72,7 +71,7 @@ class InfthorArm:
             raise ConfigError(f"{task}: frames of {sorted(sizes)} pixels; give tasks of one size")
         (size,) = sizes
         names = ("agentview", "wrist") if "wrist" in cameras else ("agentview",)
-        self.info = embodiment.EmbodimentInfo(
+        self.info = EmbodimentInfo(
             name="infthor-arm",
             action_space=spaces.Box(_MOST.shape, np.array((*-_MOST[:-1], 0.0)), _MOST, _SEMANTICS),
             observation_space=spaces.ObservationSpace(
