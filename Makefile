@@ -12,6 +12,9 @@ DEVELOPED := $(VENV)/.developed
 PEERS := $(VENV)/test-peers
 # inspect_ai reads the logs that `export` writes; eighty other packages come with it, so it has an environment of its own.
 INSPECT := $(VENV)/inspect-ai
+# Harnesses whose world our household is; tests import what ours lacks from their environments.
+VLA_EVAL := $(VENV)/vla-eval
+ROBOTS := $(VENV)/inspect-robots
 # The renderer is compiled once; otherwise each process that finds it missing would compile it.
 COMPILED := $(VENV)/.compiled
 
@@ -55,16 +58,16 @@ $(COMPILED): $(DEVELOPED) $(wildcard infthor_sim/render/*.py)
 		-k "test_questions or test_ids_frame_names or numba"
 	touch $@
 
-test: $(COMPILED) $(PEERS) $(INSPECT)
+test: $(COMPILED) $(PEERS) $(INSPECT) $(VLA_EVAL) $(ROBOTS)
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder -m "not slow"
 
 # The slow ones too; 2.3 hours of one core, so more than an hour on two. TESTS: some of them.
 TESTS ?= tests
-test-all: $(COMPILED) $(PEERS) $(INSPECT)
+test-all: $(COMPILED) $(PEERS) $(INSPECT) $(VLA_EVAL) $(ROBOTS)
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 3 --dist loadfile --no-loadscope-reorder $(TESTS)
 
 # Measures all tests, and lists those that are slow in tests/slow_tests.txt.
-test-times: $(COMPILED) $(PEERS) $(INSPECT)
+test-times: $(COMPILED) $(PEERS) $(INSPECT) $(VLA_EVAL) $(ROBOTS)
 	rm -rf build/processor_times
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder -p tests.processor_times
 	$(BIN)/python -m tests.processor_times
@@ -156,6 +159,16 @@ $(PEERS): $(DEVELOPED)
 $(INSPECT):
 	$(PYTHON) -m venv $@
 	$@/bin/$(PIP) 'inspect_ai==0.3.285'
+	touch $@
+
+$(VLA_EVAL):
+	$(PYTHON) -m venv $@
+	$@/bin/$(PIP) 'vla-eval==0.8.0'
+	touch $@
+
+$(ROBOTS):
+	$(PYTHON) -m venv $@
+	$@/bin/$(PIP) 'inspect-robots==0.60.0'
 	touch $@
 
 clean:

@@ -4,6 +4,7 @@
 """
 
 import math
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -109,12 +110,13 @@ class InfthorArm:
         except InfthorError as error:
             raise EpisodeNotRun(str(error)) from error
         is_limit = view.ended is ArmEnded.LIMIT
+        reason = "success" if view.success else "max_steps" if is_limit else "failure"
         return StepResult(
             self._observation(view),
             reward=view.reward,
             terminated=view.ended is not None and not is_limit,
             truncated=is_limit,
-            termination_reason=_reason(view),
+            termination_reason=reason if view.ended else None,
             info={"success": view.success, "distance": view.distance},
         )
 
@@ -131,25 +133,16 @@ class InfthorArm:
         return Observation(dict(view.images), state, self._instruction)
 
 
-def pickup_task(
-    task: str = "manipulathor_pickup_mini", data: str | None = None, limit: int | None = None
-) -> Task:
-    """Return `infthor-pickup`; arguments as `arm_evaluation`."""
-    return _task("infthor-pickup", task, data, limit)
-
-
-def put_task(
-    task: str = "manipulathor_put_mini", data: str | None = None, limit: int | None = None
-) -> Task:
-    """Return `infthor-put`; arguments as `arm_evaluation`."""
-    return _task("infthor-put", task, data, limit)
-
-
-def _task(name: str, task: str, data: str | None, limit: int | None) -> Task:
+def _task(*, name: str, task: str, data: str | None = None, limit: int | None = None) -> Task:
     world = _world(task, data, limit=limit)
     scenes = [Scene(key, unit.payload.instruction) for key, unit in world.units.items()]
     about = {"task": task, "data": data, "limit": limit}
     return Task(name, scenes, success_at_end(), max_steps=world.max_steps, metadata=about)
+
+
+# What `-T task=...,data=...,limit=...` changes; as `arm_evaluation` has them.
+pickup_task = partial(_task, name="infthor-pickup", task="manipulathor_pickup_mini")
+put_task = partial(_task, name="infthor-put", task="manipulathor_put_mini")
 
 
 def _world(task: str, data: str | None, **options: Any) -> ArmWorld:
@@ -157,12 +150,3 @@ def _world(task: str, data: str | None, **options: Any) -> ArmWorld:
         return ArmWorld(arm_evaluation(task, data, **options))
     except InfthorError as error:
         raise ConfigError(str(error)) from error
-
-
-def _reason(view: ArmView) -> str | None:
-    """Return why a step ends the episode, in inspect-robots' words."""
-    if view.ended is None:
-        return None
-    if view.success:
-        return "success"
-    return "max_steps" if view.ended is ArmEnded.LIMIT else "failure"

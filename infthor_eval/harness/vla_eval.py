@@ -16,8 +16,6 @@ from infthor_eval.manipulation.conversion import Call
 from infthor_eval.manipulation.worlds import ArmView, ArmWorld, arm_evaluation
 from model_adapters import ArmDelta
 
-_N_NUMBERS = 7
-
 
 class InfthorArm(StepBenchmark):
     """Pick-ups and puts with an arm, one task of vla-eval an episode.
@@ -58,9 +56,7 @@ class InfthorArm(StepBenchmark):
             send_wrist_image: as "front,wrist", by the name that model servers ask for.
             send_state: as `state`, likewise.
 
-        Raises:
-            UsageError: a value is not allowed.
-            DataError: a trajectory cannot be read.
+        UsageError or DataError for a value that cannot be used.
         """
         super().__init__()
         for name, scale in (("translation", translation_scale), ("rotation", rotation_scale)):
@@ -110,10 +106,7 @@ class InfthorArm(StepBenchmark):
         if self._wrist:
             spec["wrist"] = specs.IMAGE_RGB
         if self._state:
-            spec["state"] = replace(
-                specs.STATE_EEF_POS_EULER_GRIP,
-                description="metres, radians; gripper twice: 0 holds something, 1 is open",
-            )
+            spec["state"] = specs.STATE_EEF_POS_EULER_GRIP
         return spec
 
     def reset(self, task: dict[str, Any]) -> ArmView:
@@ -123,7 +116,13 @@ class InfthorArm(StepBenchmark):
     def step(self, action: dict[str, Any]) -> StepResult:
         """Execute `actions`, seven numbers, or `calls`; raises UsageError for anything else."""
         view = self.world.step(self._calls_of(action) if "calls" in action else self._delta(action))
-        return StepResult(view, view.reward, view.ended is not None, {"success": view.success})
+        result: dict[str, Any] = {
+            "success": view.success,
+            "reward": view.reward,
+            "distance": view.distance,
+        }
+        result["ended"] = str(view.ended or "stopped")
+        return StepResult(view, view.reward, view.ended is not None, result)
 
     def make_obs(self, raw_obs: ArmView, task: dict[str, Any]) -> dict[str, Any]:
         """Return what a model is shown; the state has both names that its servers look for."""
@@ -136,13 +135,7 @@ class InfthorArm(StepBenchmark):
 
     def get_step_result(self, step_result: StepResult) -> dict[str, Any]:
         """Return the result of an episode."""
-        view = step_result.obs
-        return {
-            "success": view.success,
-            "reward": view.reward,
-            "distance": view.distance,
-            "ended": str(view.ended or "stopped"),
-        }
+        return step_result.info
 
     def cleanup(self) -> None:
         """Stop the simulators."""
@@ -150,7 +143,7 @@ class InfthorArm(StepBenchmark):
 
     def _delta(self, action: dict[str, Any]) -> ArmDelta:
         numbers = np.asarray(action.get("actions", action.get("action")), dtype=np.float64)
-        if numbers.shape != (_N_NUMBERS,) or not np.isfinite(numbers).all():
+        if numbers.shape != (7,) or not np.isfinite(numbers).all():
             raise UsageError(
                 f"actions are {numbers.tolist()!r:.100}, not seven finite numbers; a model server "
                 "of chunks needs chunk_size"

@@ -14,11 +14,10 @@ from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.manipulation.actors import ArmActor, ArmBaseline, ArmSituation, PolicyActor, Step
 from infthor_eval.manipulation.config import ManipulationConfig
 from infthor_eval.manipulation.environment import ArmEnvironment, ArmOutcome, arm_of
-from infthor_eval.manipulation.expert import ExpertStates
+from infthor_eval.manipulation.expert import ExpertStates, expert_states
 from infthor_eval.manipulation.kinds import PutCriterion, Senses
 from infthor_eval.manipulation.options import ManipulationOptions
 from infthor_eval.manipulation.records import ArmEnded, ArmRecord, ArmStep
-from infthor_eval.manipulation.simulators import ArmSimulators
 from infthor_eval.manipulation.task import ManipulationTask
 from infthor_eval.manipulation.trajectories import ArmEpisode, ArmTrajectory
 from infthor_eval.runs import Group, RunHeader, Session, TaskRequest, UnitDoc, UnitKey, UnitRecord
@@ -28,6 +27,7 @@ from infthor_eval.thor.simulator import Simulator
 from model_adapters import ArmDelta, Episode, FramePolicy, Policy, Subject
 
 ArmUnit = EpisodeUnit[ArmRecord, ArmTrajectory, ArmEpisode]
+Camera = tuple[int, float]  # see `ArmTaskSettings.camera`
 _DIGITS = 6  # of metres and rewards; more would be rounding noise
 
 
@@ -66,6 +66,20 @@ class ManipulationEvaluation(EpisodeEvaluation[ManipulationOptions, Manipulation
             raise TypeError(f"{subject} is neither a policy nor a baseline of manipulation")
         return BoundManipulation(self, create_actor, sees=not isinstance(subject, ArmBaseline))
 
+    def expert_simulators(self) -> Simulators:
+        """Return simulators for the trajectories' expert."""
+        return self.simulators(image=False, instances=False)
+
+    def arm_simulators(self, *, image: bool) -> dict[Camera, Simulators]:
+        """Return simulators with an arm for each camera of the tasks; `image` if they draw."""
+        by_camera = {
+            task.settings.camera: task.settings.camera_options for task in self.tasks.values()
+        }
+        return {
+            camera: self.simulators(image=image, instances=False, agentMode="arm", **options)
+            for camera, options in by_camera.items()
+        }
+
     def to_doc(
         self, header: RunHeader[ManipulationConfig], record: UnitRecord[ArmRecord]
     ) -> UnitDoc:
@@ -97,9 +111,8 @@ class BoundManipulation(BoundEpisodes[ArmUnit, ArmRecord]):
         self._create_actor = create_actor
         self._sees = sees
         self._senses = evaluation.options.senses
-        self._simulators = ArmSimulators(
-            evaluation.simulators, (task.settings for task in self._tasks.values()), image=sees
-        )
+        self._experts = evaluation.expert_simulators()
+        self._arms = evaluation.arm_simulators(image=sees)
         # The episodes of all tasks by trajectory, in time order: one replay of its expert serves
         # them all.
         by_trajectory: dict[str, list[ArmUnit]] = {unit.cluster: [] for unit in evaluation.units}
@@ -108,7 +121,7 @@ class BoundManipulation(BoundEpisodes[ArmUnit, ArmRecord]):
         super().__init__(
             evaluation,
             evaluation.workload(by_trajectory.values()),
-            self._simulators.all,
+            [self._experts, *self._arms.values()],
         )
 
     def run(
@@ -117,13 +130,12 @@ class BoundManipulation(BoundEpisodes[ArmUnit, ArmRecord]):
         """See `infthor_eval.runs.BoundEvaluation.run`."""
         fingerprints, known = self._find_records(group, session)
         yield from (record for record in known.values() if record is not None)
-        by_camera: dict[Simulators, list[ArmUnit]] = {}
+        by_camera: dict[Camera, list[ArmUnit]] = {}
         for unit in group.units:
             if known[unit.key] is None:
-                arms = self._simulators.with_arm(self._tasks[unit.key.task].settings)
-                by_camera.setdefault(arms, []).append(unit)
-        for arms, units in by_camera.items():
-            yield from self._run_episodes(units, fingerprints, arms, session)
+                by_camera.setdefault(self._tasks[unit.key.task].settings.camera, []).append(unit)
+        for camera, units in by_camera.items():
+            yield from self._run_episodes(units, fingerprints, self._arms[camera], session)
 
     def _run_episodes(
         self,
@@ -134,7 +146,7 @@ class BoundManipulation(BoundEpisodes[ArmUnit, ArmRecord]):
     ) -> Iterator[UnitRecord[ArmRecord]]:
         trajectory = units[0].trajectory.data
         try:
-            states, faults = self._simulators.expert_states(trajectory)
+            states, faults = expert_states(trajectory, self._experts)
         except SceneError as error:
             yield from (unit.record_exclusion(str(error), fingerprints[unit.key]) for unit in units)
             return

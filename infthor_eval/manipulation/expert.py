@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from infthor_eval.episodes.records import InfeasibleError
+from infthor_eval.episodes.retries import with_retries
+from infthor_eval.episodes.simulators import Simulators
 from infthor_eval.formats.trajectory import LowAction, Trajectory
 from infthor_eval.manipulation.kinds import ManipulationKind
 from infthor_eval.manipulation.trajectories import EXPERT_ACTIONS, ArmEpisode
@@ -85,6 +87,15 @@ def replay_expert(trajectory: Trajectory, simulator: Simulator) -> ExpertStates:
                 before, before.inventory[0], walked_from, call["objectId"]
             )
     return ExpertStates(starts)
+
+
+def expert_states(
+    trajectory: Trajectory, experts: Simulators
+) -> tuple[ExpertStates, tuple[str, ...]]:
+    """Replay the expert in one of these simulators, again if that fails for good; return the
+    faults, too."""
+    with experts.one() as expert:
+        return with_retries(expert, lambda: replay_expert(trajectory, expert), lambda: None)
 
 
 def _refusal(number: int, low: LowAction, why: str) -> str:

@@ -1,6 +1,6 @@
 """Episodes of arms one at a time, for a harness that chooses them and steps through them itself.
 
-To give another harness our episodes: a module in `infthor_eval/harness/` around `ArmWorld`.
+To add a harness that drives our arms: a module in `infthor_eval/harness/` around `ArmWorld`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -14,15 +14,14 @@ from numpy.typing import NDArray
 
 from infthor_eval.episodes.records import InfeasibleError
 from infthor_eval.episodes.retries import with_retries
-from infthor_eval.episodes.simulators import Simulators
-from infthor_eval.errors import DataError, SceneError, SimulatorError, UsageError, unknown_name
+from infthor_eval.errors import DataError, SceneError, SimulatorError, UsageError
 from infthor_eval.manipulation.conversion import Call
 from infthor_eval.manipulation.environment import ArmEnvironment, ArmOutcome, arm_of
-from infthor_eval.manipulation.evaluation import ArmUnit, ManipulationEvaluation
+from infthor_eval.manipulation.evaluation import ArmUnit, Camera, ManipulationEvaluation
+from infthor_eval.manipulation.expert import expert_states
 from infthor_eval.manipulation.options import ManipulationOptions
 from infthor_eval.manipulation.records import ArmEnded
 from infthor_eval.manipulation.senses import WRIST, hand_state
-from infthor_eval.manipulation.simulators import ArmSimulators
 from infthor_eval.manipulation.suite import ManipulationSuite
 from infthor_eval.runs import Catalog, TaskRequest
 from infthor_eval.thor.frames import NoFrames
@@ -71,10 +70,9 @@ def arm_evaluation(
     others = [file.name for file in files if file.suite != ManipulationSuite.name]
     if others:
         raise UsageError(f"{others[0]} is no task of an arm; `infthor-eval ls tasks` lists those")
-    request = TaskRequest(
-        files, ManipulationOptions(cameras=cameras), Path(data) if data else None, limit
-    )
-    evaluation = ManipulationEvaluation(request)
+    options = ManipulationOptions(cameras=cameras)
+    place = Path(data) if data else None
+    evaluation = ManipulationEvaluation(TaskRequest(files, options, place, limit))
     for checked in evaluation.tasks.values():
         for path, reason in checked.trajectories.broken:
             raise DataError(f"{path} cannot be used ({reason}); mend it or take it out")
@@ -97,9 +95,10 @@ class ArmWorld:
         self.units = {f"{unit.key.task}/{unit.key.id}": unit for unit in ordered}
         self.settings = {name: task.settings for name, task in evaluation.tasks.items()}
         self._senses = evaluation.options.senses
-        self._simulators = ArmSimulators(evaluation.simulators, self.settings.values(), image=True)
+        self._experts = evaluation.expert_simulators()
+        self._arms = evaluation.arm_simulators(image=True)
         self._lent = ExitStack()
-        self._place: tuple[str, Simulators] | None = None
+        self._place: tuple[str, Camera] | None = None
         self._environment: ArmEnvironment | None = None
 
     @property
@@ -115,15 +114,12 @@ class ArmWorld:
         return self._environment
 
     def reset(self, name: str) -> ArmView:
-        """Begin an episode.
+        """Begin the episode of a name.
 
         Raises:
-            UsageError: there is no episode of this name.
             InfeasibleError: it cannot begin here, so that it does not count.
             SimulatorError: the simulator fails again and again.
         """
-        if name not in self.units:
-            raise unknown_name("episode", name, self.units)
         self._unit = self.units[name]
         self._settings = self.settings[self._unit.key.task]
         self._n_steps = 0
@@ -159,18 +155,18 @@ class ArmWorld:
         """Stop all simulators; safe to call again."""
         self._leave()
         with ExitStack() as stack:
-            for simulators in self._simulators.all:
+            for simulators in (self._experts, *self._arms.values()):
                 stack.callback(simulators.close)
 
     def _enter(self, unit: ArmUnit) -> None:
         """Borrow a simulator for the episode's trajectory, unless it is the last one's."""
-        arms = self._simulators.with_arm(self._settings)
-        if self._place == (unit.cluster, arms):
+        place = unit.cluster, self._settings.camera
+        if self._place == place:
             return
         self._leave()
-        self._states, _ = self._simulators.expert_states(unit.trajectory.data)
-        self._simulator = self._lent.enter_context(arms.one())
-        self._place = (unit.cluster, arms)
+        self._states, _ = expert_states(unit.trajectory.data, self._experts)
+        self._simulator = self._lent.enter_context(self._arms[self._settings.camera].one())
+        self._place = place
 
     def _leave(self) -> None:
         self._place = None

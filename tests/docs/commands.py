@@ -19,16 +19,19 @@ PERSON = "a person answers, or looks at a page"
 CLONE = "is for who changes the project, in a clone"
 HOURS = "takes many minutes of a processor"
 ELSEWHERE = "needs the example package installed; tests/examples does that"
+OTHERS = "needs another harness installed; tests/harness runs it"
 
 # Pages whose commands are parsed and not run.
 PARSED_PAGES = {
     "CONTRIBUTING.md": CLONE,
     "docs/engines.md": GPU,
     "docs/figures.md": HOURS,
+    "docs/howto/inspect-robots.md": OTHERS,
     "docs/howto/own-scenes.md": HOURS,
     "docs/howto/publish-a-set.md": READERS,
     "docs/howto/trackers.md": "needs an account of a tracker",
     "docs/howto/unity.md": UNITY,
+    "docs/howto/vla-eval.md": OTHERS,
     "docs/manipulation.md": HOURS,
     "docs/memories.md": HOURS,
     "docs/nieh.md": HOURS,
@@ -57,7 +60,10 @@ CANNOT_RUN = {
     r"import-replies exported|lm-eval run \.\.\.": READERS,
 }
 OURS = ("infthor-eval", "infthor-board")
-PROGRAMS = (*OURS, "make", "lm-eval", "pip", "python", "hf", "torchrun", "export")
+PROGRAMS = (
+    *(*OURS, "make", "lm-eval", "pip", "python", "hf", "torchrun", "export"),
+    *("vla-eval", "inspect-robots"),
+)
 _RUN_HERE = ("infthor-eval", "lm-eval")
 
 

@@ -54,7 +54,7 @@ def evaluate(tmp_path, data):
 
     def evaluate(policy, kind=PICKUP, limit=None, **options):
         factory = {PICKUP: pickup_task, PUT: put_task}[kind]
-        task = factory(kind, str(data), limit)
+        task = factory(task=kind, data=str(data), limit=limit)
         arm = InfthorArm(f"{PICKUP},{PUT}", str(data), **options)
         logs = tmp_path / "logs"
         try:
@@ -142,7 +142,7 @@ def test_the_embodiment_fulfils_their_contract(data):
     # A household that waits for its policy has no rate.
     assert [issue.code for issue in check_embodiment(info).issues] == ["control_hz"]
     assert [camera.height for camera in info.observation_space.cameras] == [64]
-    assert pickup_task(PICKUP, str(data)).max_steps == MAX_STEPS
+    assert pickup_task(task=PICKUP, data=str(data)).max_steps == MAX_STEPS
 
 
 def test_scenes_of_other_episodes_are_refused(data, policy):
@@ -152,7 +152,9 @@ def test_scenes_of_other_episodes_are_refused(data, policy):
     from infthor_eval.harness.inspect_robots import InfthorArm, put_task
 
     with pytest.raises(ConfigError, match=f"is no episode of {PICKUP}; give the embodiment"):
-        inspect_robots.eval(put_task(PUT, str(data)), policy(), InfthorArm(PICKUP, str(data)))
+        inspect_robots.eval(
+            put_task(task=PUT, data=str(data)), policy(), InfthorArm(PICKUP, str(data))
+        )
 
 
 @pytest.mark.parametrize(

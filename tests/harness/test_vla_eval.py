@@ -39,7 +39,7 @@ def data(tmp_path, task_files):
 
 @pytest.fixture
 def evaluate(tmp_path, data):
-    """Runs a model server on our episodes as vla-eval does; gives what it writes of each, by name."""
+    """Runs a model server on our episodes as vla-eval does; gives what it writes, by name."""
     import vla_eval
 
     def evaluate(server, **params):
@@ -104,7 +104,7 @@ def test_a_server_asks_for_the_wrist_and_the_hand_and_is_shown_them(data, frames
         "agentview": (64, 64, 3),
         "wrist": (64, 64, 3),
     }
-    assert list(seen["images"])[0] == "agentview"
+    assert next(iter(seen["images"])) == "agentview"
     assert seen["states"].shape == (8,)
     assert (seen["states"] == seen["state"]).all()
     assert (seen["states"][-2:] == 1).all()  # nothing is held before a pick-up

@@ -33,11 +33,3 @@ def peer_imports(name: str) -> Iterator[None]:
         yield
     finally:
         sys.path.remove(folder)
-
-
-def peer_program(name: str, module: str, function: str = "main") -> str:
-    """The code of a process that is an environment's command, with our packages beside it."""
-    return (
-        f"import sys; sys.path.append({str(peer_packages(name))!r})\n"
-        f"from {module} import {function}\nsys.exit({function}())"
-    )
