@@ -12,7 +12,8 @@ DEVELOPED := $(VENV)/.developed
 PEERS := $(VENV)/test-peers
 # inspect_ai reads the logs that `export` writes; eighty other packages come with it, so it has an environment of its own.
 INSPECT := $(VENV)/inspect-ai
-# Harnesses whose world our household is; tests import what ours lacks from their environments.
+# Harnesses whose world our household is: folders apart, as a dozen other packages come with them, and others take
+# websockets where they see it.
 VLA_EVAL := $(VENV)/vla-eval
 ROBOTS := $(VENV)/inspect-robots
 # The renderer is compiled once; otherwise each process that finds it missing would compile it.
@@ -156,19 +157,18 @@ $(PEERS): $(DEVELOPED)
 	$(BIN)/$(PIP) -c constraints.txt --no-deps --upgrade --target $@ torchvision
 	touch $@
 
+$(VLA_EVAL): $(DEVELOPED)
+	$(BIN)/$(PIP) -c constraints.txt --no-deps --upgrade --target $@ vla-eval websockets lazyregistry omegaconf \
+		jsonargparse docstring_parser typeshed_client imageio
+	touch $@
+
+$(ROBOTS): $(DEVELOPED)
+	$(BIN)/$(PIP) -c constraints.txt --no-deps --upgrade --target $@ inspect-robots
+	touch $@
+
 $(INSPECT):
 	$(PYTHON) -m venv $@
 	$@/bin/$(PIP) 'inspect_ai==0.3.285'
-	touch $@
-
-$(VLA_EVAL):
-	$(PYTHON) -m venv $@
-	$@/bin/$(PIP) 'vla-eval==0.8.0'
-	touch $@
-
-$(ROBOTS):
-	$(PYTHON) -m venv $@
-	$@/bin/$(PIP) 'inspect-robots==0.60.0'
 	touch $@
 
 clean:

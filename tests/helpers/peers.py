@@ -1,6 +1,6 @@
-"""Packages of others that a test needs in this process, from environments of their own.
+"""Packages of others that a test needs in this process, from folders of their own.
 
-`make test` puts the environments beside the packages that it installs; PEERS names another folder.
+`make test` puts the folders beside the packages that it installs; PEER_FOLDERS names another place.
 """
 
 import os
@@ -13,20 +13,19 @@ import pytest
 
 
 def peer_packages(name: str) -> Path:
-    """The folder of an environment's packages."""
-    version = f"python{sys.version_info.major}.{sys.version_info.minor}"
-    return Path(os.environ.get("PEERS", sys.prefix)) / name / "lib" / version / "site-packages"
+    """The folder of packages that a harness needs beside ours."""
+    return Path(os.environ.get("PEER_FOLDERS", sys.prefix)) / name
 
 
 def needs_peer(name: str) -> pytest.MarkDecorator:
-    """Skips tests where an environment is not there."""
+    """Skips tests where a folder is not there."""
     folder = peer_packages(name)
     return pytest.mark.skipif(not folder.is_dir(), reason=f"no {folder}; `make test` puts it there")
 
 
 @contextmanager
 def peer_imports(name: str) -> Iterator[None]:
-    """Lets an environment's packages be imported that ours has not."""
+    """Lets a folder's packages be imported that ours has not."""
     folder = str(peer_packages(name))
     sys.path.append(folder)
     try:
