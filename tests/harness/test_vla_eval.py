@@ -66,9 +66,9 @@ def frames(tmp_path):
     return folder
 
 
-@pytest.mark.parametrize("model", ["openvla-tiny", "script"])
+@pytest.mark.parametrize(("model", "dtype"), [("openvla-tiny", "float64"), ("script", "float32")])
 def test_policies_succeed_in_the_same_episodes_as_through_our_own_command(
-    model, data, tmp_path, frames, run_cli, evaluate
+    model, dtype, data, tmp_path, frames, run_cli, evaluate
 ):
     from tests.harness.vla_eval_servers import PolicyServer
 
@@ -76,7 +76,7 @@ def test_policies_succeed_in_the_same_episodes_as_through_our_own_command(
         (tmp_path / "script.py").write_text(SCRIPT)
         model = f"{tmp_path / 'script.py'}:act"
     ours = own_successes(run_cli, model=model, tasks=TASKS, data=data, out=tmp_path / "ours")
-    theirs = evaluate(PolicyServer(load(model, {}, 0), frames))
+    theirs = evaluate(PolicyServer(load(model, {}, 0), frames, dtype))
     assert set(ours.values()) == {True, False}
     assert successes(theirs) == ours
     for name, episode in theirs.items():

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 from PIL import Image
-from vla_eval.model_servers import ModelServer, PredictModelServer
+from vla_eval.model_servers import ModelServer
 
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.harness.vla_eval import InfthorArm
@@ -26,11 +26,11 @@ class Watched(InfthorArm):
         Watched.last = self
 
 
-class PolicyServer(PredictModelServer):
-    """A policy of ours as one of theirs, which is told what theirs are."""
+class PolicyServer(ModelServer):
+    """A policy of ours as one of theirs, which is told what theirs are; theirs send float32."""
 
-    def __init__(self, policy, folder: Path, scales=(0.05, 0.5), wants=()):
-        super().__init__(chunk_size=64)
+    def __init__(self, policy, folder: Path, dtype="float64", scales=(0.05, 0.5), wants=()):
+        self._dtype = dtype
         self._policy = with_episodes(policy)
         self._folder = folder
         self._scales = np.repeat(scales, 3)
@@ -41,12 +41,17 @@ class PolicyServer(PredictModelServer):
         return dict.fromkeys(self._wants, True)
 
     async def on_episode_start(self, config, ctx):
-        await super().on_episode_start(config, ctx)
         self._instruction = config["task"]["instruction"]
         self._n_steps = 0
+        self._chunk = []
         self._policy.begin(Episode(config["task"]["name"], self._instruction, 60))
 
-    def predict(self, obs, ctx):
+    async def on_observation(self, obs, ctx):
+        if not self._chunk:
+            self._chunk = self._rows(obs)
+        await ctx.send_action({"actions": np.array(self._chunk.pop(0), dtype=self._dtype)})
+
+    def _rows(self, obs):
         self.shown.append(obs)
         assert obs["task_description"] == self._instruction
         frames = [self._frame(image) for image in obs["images"].values()]
@@ -56,7 +61,7 @@ class PolicyServer(PredictModelServer):
             state = HandState(tuple(numbers[:3]), tuple(numbers[3:6]), numbers[7])
         chunk = self._policy.act(ArmObservation(*frames, state=state, step=self._n_steps))
         self._n_steps += len(chunk)
-        return {"actions": np.array([self._row(delta) for delta in chunk])}
+        return [self._row(delta) for delta in chunk]
 
     def _row(self, delta):
         moved = np.array((*delta.translation, *delta.rotation)) / self._scales
