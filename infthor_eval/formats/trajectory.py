@@ -17,7 +17,7 @@ from msgspec import Meta
 from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.packed.paths import SetPath
 from infthor_eval.formats.reading import lines_of, read_bytes
-from infthor_eval.formats.twins import TwinWorld
+from infthor_eval.formats.twins import ArmChoice, TwinWorld
 from infthor_eval.storage.digests import digest
 from infthor_eval.storage.limits import OBJECT_POSES
 
@@ -204,7 +204,7 @@ class SubTrajectory(_Fields, omit_defaults=False):
 class Trajectory(_Fields):
     """One trajectory; not all formats have the fields below `plan` (see the module's docstring).
 
-    `twin` is our addition, for pairs of twins with a final task.
+    `twin` and `arm_choices` are our additions, for pairs of twins with a final task, and of arms.
     """
 
     scene: Scene
@@ -223,6 +223,7 @@ class Trajectory(_Fields):
     turk_annotations: dict[str, Any] | None = None
     gen_info: dict[str, Any] | None = None
     twin: TwinWorld | None = None
+    arm_choices: list[ArmChoice] = msgspec.field(default_factory=list)
 
 
 @dataclass(frozen=True)

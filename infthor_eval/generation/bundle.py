@@ -12,6 +12,7 @@ their questions do not need.
 import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import partial
 from itertools import chain
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
@@ -35,7 +36,7 @@ from infthor_eval.generation.generate_set import generate_set
 from infthor_eval.generation.questions.generate import GeneratedQuestions, generate_questions
 from infthor_eval.generation.replay_set import replay_set, select
 from infthor_eval.generation.settings import TrajectorySettings
-from infthor_eval.generation.twins.drafting import TwinSettings
+from infthor_eval.generation.twins.drafting import TwinSettings, draft_twins
 from infthor_eval.generation.twins.pairing import ScoreReply
 from infthor_eval.generation.twins.twin_set import TwinSummary, make_twins
 from infthor_eval.generation.twins.undrawn import copy_questions, pack_worlds
@@ -192,7 +193,7 @@ def build_twins(
             embedded_launch(),
             work / _REPLAYED,
             manifest.twins,
-            score,
+            partial(draft_twins, score=score),
             per_trajectory=manifest.per_trajectory,
             worker_settings=worker_settings,
             advance=advance,

@@ -11,6 +11,7 @@ from infthor_eval.episodes.retries import with_retries
 from infthor_eval.episodes.running import EpisodeResult, EpisodeRunner
 from infthor_eval.episodes.simulators import Simulators
 from infthor_eval.errors import SceneError, UsageError
+from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.manipulation.actors import ArmActor, ArmBaseline, ArmSituation, PolicyActor, Step
 from infthor_eval.manipulation.config import ManipulationConfig
@@ -98,7 +99,8 @@ class BoundManipulation(BoundEpisodes[ArmUnit, ArmRecord]):
         self._create_actor = create_actor
         self._sees = sees
         self._senses = evaluation.options.senses
-        self._experts = evaluation.simulators(image=False, instances=False)
+        self._tells_history = sees and any(task.tells_history for task in self._tasks.values())
+        self._experts = evaluation.simulators(image=self._tells_history, instances=False)
         by_camera = {
             task.settings.camera: task.settings.camera_options for task in self._tasks.values()
         }
@@ -137,29 +139,38 @@ class BoundManipulation(BoundEpisodes[ArmUnit, ArmRecord]):
         arms: Simulators,
         session: Session[ArmRecord],
     ) -> Iterator[UnitRecord[ArmRecord]]:
-        trajectory = units[0].trajectory.data
-        try:
-            with self._experts.one() as expert:
-                states, faults = with_retries(
-                    expert, lambda: replay_expert(trajectory, expert), lambda: None
+        with _keep_frames(self._tells_history) as seen:
+            history: list[FrameRef | None] = []
+            trajectory = units[0].trajectory.data
+
+            def replay(expert: Simulator) -> ExpertStates:
+                history.clear()
+                see = lambda view: history.append(seen.keep(view))  # noqa: E731
+                return replay_expert(trajectory, expert, see)
+
+            try:
+                with self._experts.one() as expert:
+                    states, faults = with_retries(expert, lambda: replay(expert), lambda: None)
+            except SceneError as error:
+                yield from (
+                    unit.record_exclusion(str(error), fingerprints[unit.key]) for unit in units
                 )
-        except SceneError as error:
-            yield from (unit.record_exclusion(str(error), fingerprints[unit.key]) for unit in units)
-            return
-        with arms.one() as simulator:
-            runner = ArmRunner(
-                trajectory,
-                states,
-                simulator,
-                self._create_actor(),
-                senses=self._senses if self._sees else None,
-                seed=self.seed,
-            )
-            for unit in units:
-                run = partial(runner.run, self._tasks[unit.key.task], unit.episode)
-                record = runner.record(unit, fingerprints[unit.key], run, session)
-                yield msgspec.structs.replace(record, faults=(*faults, *record.faults))
-                faults = ()  # those of the expert's simulator are recorded once
+                return
+            with arms.one() as simulator:
+                runner = ArmRunner(
+                    trajectory,
+                    states,
+                    simulator,
+                    self._create_actor(),
+                    senses=self._senses if self._sees else None,
+                    seed=self.seed,
+                    history=tuple(frame for frame in history if frame is not None),
+                )
+                for unit in units:
+                    run = partial(runner.run, self._tasks[unit.key.task], unit.episode)
+                    record = runner.record(unit, fingerprints[unit.key], run, session)
+                    yield msgspec.structs.replace(record, faults=(*faults, *record.faults))
+                    faults = ()  # those of the expert's simulator are recorded once
 
 
 def _arm_record(task: ManipulationTask, episode: ArmEpisode) -> ArmRecord:
@@ -170,6 +181,8 @@ def _arm_record(task: ManipulationTask, episode: ArmEpisode) -> ArmRecord:
         instruction=task.instruction(episode),
         max_reward=task.settings.reward,
         put_criterion=PutCriterion(task.settings.put_criterion),
+        pair="" if episode.choice is None else episode.choice.pair,
+        base="" if episode.choice is None else episode.choice.base,
     )
 
 
@@ -185,19 +198,21 @@ class ArmRunner(EpisodeRunner[ArmEnvironment, ArmRecord]):
         *,
         senses: Senses | None,
         seed: int,
+        history: tuple[FrameRef, ...] = (),
     ) -> None:
         """Take a trajectory, the states that its episodes begin in, and a simulator with an arm; no
-        senses if the actor looks at nothing."""
+        senses if the actor looks at nothing; and its frames, where episodes are about them."""
         super().__init__(simulator, lambda: ArmEnvironment(trajectory, simulator, senses))
         self._states = states
         self._actor = actor
+        self._history = history
         self._sees = senses is not None
         self._seed = f"{seed}/{trajectory.traj_id}"
 
     def run(self, task: ManipulationTask, episode: ArmEpisode) -> EpisodeResult[ArmRecord]:
         """Run an episode."""
         start = self._states.before(episode)
-        with self._frames() as frames:
+        with _keep_frames(self._sees) as frames:
             environment = self.environment
             outcome = environment.reset(
                 episode, start, task.settings.conversion, task.settings.grasp, frames
@@ -210,14 +225,19 @@ class ArmRunner(EpisodeRunner[ArmEnvironment, ArmRecord]):
                 start_distance=round(outcome.distance, _DIGITS),
             )
             seed = f"{self._seed}/{task.name}/{episode.index}"
-            told = Episode(seed, self.begun.instruction, task.settings.max_steps)
+            history = self._history if task.tells_history else ()
+            told = Episode(seed, self.begun.instruction, task.settings.max_steps, history)
             self._actor.begin(ArmSituation(environment, told, seed, task.settings.max_step))
             if isinstance(self._actor, PolicyActor) and outcome.observation is not None:
                 self.request = self._actor.request(outcome.observation)
             steps, ended = self._act(environment, outcome, task.settings.max_steps)
             closest = min([outcome.distance, *(step.distance for step in steps)])
             record = msgspec.structs.replace(
-                self.begun, steps=tuple(steps), closest=round(closest, _DIGITS), ended=str(ended)
+                self.begun,
+                steps=tuple(steps),
+                closest=round(closest, _DIGITS),
+                ended=str(ended),
+                nears_other=environment.nears_other(),
             )
             self._actor.end(success=record.done)
         reward = task.settings.reward if record.done else 0.0
@@ -245,14 +265,15 @@ class ArmRunner(EpisodeRunner[ArmEnvironment, ArmRecord]):
             steps.append(_arm_step(step, outcome))
         return steps, outcome.ended
 
-    @contextmanager
-    def _frames(self) -> Iterator[FrameKeeper]:
-        """Keep frames for the length of an episode."""
-        if not self._sees:
-            yield NoFrames()
-            return
-        with ScratchFolder() as folder:
-            yield FrameFolder(folder)
+
+@contextmanager
+def _keep_frames(are_kept: bool) -> Iterator[FrameKeeper]:
+    """Keep frames within the context, if at all."""
+    if not are_kept:
+        yield NoFrames()
+        return
+    with ScratchFolder() as folder:
+        yield FrameFolder(folder)
 
 
 def _arm_step(step: Step, outcome: ArmOutcome) -> ArmStep:
