@@ -198,7 +198,7 @@ class VlaHttpOptions(ServedPolicyOptions):
     def __post_init__(self) -> None:
         act_url(self.url)
         if self.reset is not None and not _PATH.fullmatch(self.reset):
-            raise ValueError(f"reset={self.reset} is no path; write /reset")
+            raise ValueError("reset is no path without a query; write /reset")
 
 
 @dataclass(frozen=True, kw_only=True)
