@@ -21,6 +21,7 @@ GRIPPERS = {
     "binary_close_01": (1.0, 0.0),
 }
 STATES = ("eef_pos3_euler3_gripper2", "eef_pos3_axisangle3_gripper2", "eef_pos3_quat4_gripper1")
+_Scale = Annotated[float, Meta(gt=0, le=100)]
 _PATH = re.compile(r"(/[\w.~-]+)+")
 _Execute = Annotated[
     Total | None, Setting(help="Steps of a chunk that are returned; default: all.", of="steps")
@@ -207,8 +208,7 @@ class SocketPolicyOptions(ServedPolicyOptions):
 
     url: Annotated[str, Setting(help="Address of the server.")] = "ws://localhost:8000"
     translation_scale: Annotated[
-        float | None,
-        Meta(gt=0, le=100),
+        _Scale | None,
         Setting(
             help="What 1 of a movement is; default: 0.05 if declared from -1 to 1 or not at all, "
             "else 1.",
@@ -216,8 +216,7 @@ class SocketPolicyOptions(ServedPolicyOptions):
         ),
     ] = None
     rotation_scale: Annotated[
-        float | None,
-        Meta(gt=0, le=100),
+        _Scale | None,
         Setting(
             help="What 1 of an angle is; default: 0.5 if declared from -1 to 1 or not at all, "
             "else 1.",
