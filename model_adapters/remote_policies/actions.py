@@ -134,8 +134,9 @@ def _chunk(server: str, actions: Any, size: int, padded: bool) -> Numbers:
         given = np.atleast_2d(np.asarray(actions))
         if given.dtype.kind not in "fiu":
             raise ValueError(f"{type(actions).__name__} of {given.dtype}")
-    chunk, n_numbers = given.astype(np.float64), given.shape[-1]
-    if chunk.ndim != 2 or not len(chunk) or n_numbers < size or (n_numbers > size and not padded):
+    chunk = given.astype(np.float64)
+    fits = chunk.shape[-1] >= size if padded else chunk.shape[-1] == size
+    if chunk.ndim != 2 or not len(chunk) or not fits:
         shape = list(chunk.shape)
         raise ModelError(f"{server} gives actions of shape {shape}, not rows of {size} numbers")
     if not (np.abs(chunk) <= MOST).all():
@@ -149,7 +150,8 @@ def _euler(turn: Rotation) -> Numbers:
 
 def _from_columns(numbers: Numbers, _: float) -> Numbers:
     """Return the angles of matrices whose first two columns are given, interleaved."""
-    first, second = numbers[:, ::2], numbers[:, 1::2]
+    first = numbers[:, ::2]
+    second = numbers[:, 1::2]
     third = np.cross(first, second)
     if not np.linalg.norm(third, axis=1).all():
         raise ValueError("two columns of a matrix are parallel")

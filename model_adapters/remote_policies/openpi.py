@@ -4,7 +4,7 @@ Its own client, openpi-client, needs a numpy below 2 and cannot be installed her
 what goes over the wire. The wire has no episodes: the server is told of no beginning and no end.
 """
 
-from typing import Any, ClassVar
+from typing import Any
 
 import msgpack
 import numpy as np
@@ -49,15 +49,11 @@ class OpenPiSession(Session):
         return answer
 
 
-class OpenPi:
+class OpenPi(RemotePolicy):
     """The adapter `openpi`."""
 
-    Options: ClassVar[type] = OpenPiOptions
-
-    @classmethod
-    def build(cls, name: str, options: OpenPiOptions, seed: int) -> RemotePolicy:  # noqa: ARG003
-        """Connect to the server (ModelError if there is none)."""
-        return RemotePolicy(name, options, lambda: OpenPiSession(name, options))
+    Options = OpenPiOptions
+    session = OpenPiSession
 
 
 def pack(value: Any) -> bytes:

@@ -3,10 +3,10 @@
 import importlib
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import asdict
-from typing import Any
+from typing import Any, ClassVar, Self
 from urllib.parse import urlsplit
 
 from infthor_eval.errors import ModelError, in_one_line, wrap_errors
@@ -23,8 +23,8 @@ _OF_NO_ACTION = {"timeout_s", "retries", "deterministic", "max_in_flight"}
 
 def import_extra(name: str, module: str) -> Any:
     """Return a module that the adapter of this name needs (ModelError)."""
-    problem, hint = f"{name} lacks a package", "pip install 'infthor-eval[vla]'"
-    with wrap_errors(problem, hint, catch=ImportError, raise_as=ModelError):
+    hint = "pip install 'infthor-eval[vla]'"
+    with wrap_errors(f"{name} lacks a package", hint, catch=ImportError, raise_as=ModelError):
         return importlib.import_module(module)
 
 
@@ -106,13 +106,14 @@ class Session:
         if isinstance(content, str):  # of openpi, a traceback
             line = content.strip().rpartition("\n")[2]
             raise ModelError(f"{self.server} answers with the text {line!r}; see its log")
-        problem, hint = f"{self.server} sends no message of its protocol", "is it the right server?"
+        problem = f"{self.server} sends no message of its protocol"
         broken = (ValueError, TypeError, KeyError)
-        with wrap_errors(problem, hint, catch=broken, raise_as=ModelError):
+        with wrap_errors(problem, "is it another server?", catch=broken, raise_as=ModelError):
             return self._unpack(content)
 
     def _connected(self) -> Any:
-        options, reason = self._options, OSError()
+        options = self._options
+        reason = OSError()
         for attempt in range(options.retries + 1):
             if attempt:
                 time.sleep(_FIRST_WAIT_S * 2 ** (attempt - 1))
@@ -143,11 +144,9 @@ class Session:
         except TimeoutError as error:
             late = f"{self.server} does not answer within {self._options.timeout_s:g} s"
             raise ModelError(f"{late}; raise timeout_s if it is slow") from error
-        except self._errors as error:
-            reason = in_one_line(error)
-            raise ModelError(
-                f"{self.server} ends the connection ({reason}); see its log"
-            ) from error
+        except (self._errors, ImportError) as error:  # ImportError: of a SOCKS proxy's package
+            ended = f"{self.server} ends the connection ({in_one_line(error)})"
+            raise ModelError(f"{ended}; see its log") from error
 
 
 class _OfThread(threading.local):
@@ -161,23 +160,27 @@ class RemotePolicy:
     sends is not read, and no episode goes on in a session that does not know its beginning. What a
     server says of itself must stay the same, as actions are read by it.
 
-    Args:
-        name: the adapter.
-        options: as given.
-        connect: opens a session; called at once, so that a server that is not there or does not
-            fit ends a run before it begins (ModelError).
+    Subclasses are the adapters.
+
+    Attributes:
+        session: class of the sessions.
     """
 
-    def __init__(
-        self, name: str, options: SocketPolicyOptions, connect: Callable[[], Session]
-    ) -> None:
+    Options: ClassVar[type] = SocketPolicyOptions
+    session: ClassVar[type[Session]]
+
+    def __init__(self, name: str, options: SocketPolicyOptions) -> None:
         self.name = name
         self._options = options
-        self._connect = connect
         self._here = _OfThread()
-        self._here.session = first = connect()
+        self._here.session = first = self.session(name, options)
         self._sessions = {first}
         self._said = {"server": first.greeting, "actions": asdict(first.convention)}
+
+    @classmethod
+    def build(cls, name: str, options: SocketPolicyOptions, seed: int) -> Self:  # noqa: ARG003
+        """Connect, so that a server that does not fit ends a run before it begins (ModelError)."""
+        return cls(name, options)
 
     @property
     def capabilities(self) -> Capabilities:
@@ -200,7 +203,7 @@ class RemotePolicy:
         session = self._here.session
         if session is None or not session.is_open:
             self._drop()
-            session = self._here.session = self._connect()
+            session = self._here.session = self.session(self.name, self._options)
             self._sessions.add(session)
         with self._dropping():
             if session.greeting != self._said["server"]:
@@ -238,7 +241,8 @@ class RemotePolicy:
             raise
 
     def _drop(self) -> None:
-        session, self._here.session = self._here.session, None
+        session = self._here.session
+        self._here.session = None
         if session is not None:
             self._sessions.discard(session)
             session.close()

@@ -5,7 +5,7 @@ here an answer belongs to the request of its number.
 """
 
 import time
-from typing import Any, ClassVar
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -72,7 +72,8 @@ class VlaEvalSession(Session):
 
     def _read_wants(self, hello: _Hello) -> None:
         """Keep what the server is to be told beside the view and the instruction."""
-        params, spec = hello.observation_params, hello.observation_spec
+        params = hello.observation_params
+        spec = hello.observation_spec
         images = [key for key, part in spec.items() if part.format == _IMAGE]
         state = spec.get("state", spec.get("states"))
         known = {*images, "state", "states", "language"}
@@ -92,14 +93,11 @@ class VlaEvalSession(Session):
         self._needs_wrist = has_wrist or bool(params.get("send_wrist_image"))
 
     def _ask(self, observation: ArmObservation, instruction: str) -> dict[Any, Any]:
-        missing = [
-            option
-            for option, is_missing in (
-                ("--cameras front,wrist", self._needs_wrist and observation.wrist is None),
-                ("--state", self._needs_state and observation.state is None),
-            )
-            if is_missing
-        ]
+        missing = []
+        if self._needs_wrist and observation.wrist is None:
+            missing.append("--cameras front,wrist")
+        if self._needs_state and observation.state is None:
+            missing.append("--state")
         if missing:
             raise ModelError(f"{self.server} needs more than is given; add {' '.join(missing)}")
         # The view is first: many servers go by the order of images, not by their names.
@@ -144,12 +142,7 @@ class VlaEvalSession(Session):
         return message
 
 
-class VlaEval:
+class VlaEval(RemotePolicy):
     """The adapter `vla-eval`."""
 
-    Options: ClassVar[type] = SocketPolicyOptions
-
-    @classmethod
-    def build(cls, name: str, options: SocketPolicyOptions, seed: int) -> RemotePolicy:  # noqa: ARG003
-        """Connect to the server, and read what it declares (ModelError if that does not fit)."""
-        return RemotePolicy(name, options, lambda: VlaEvalSession(name, options))
+    session = VlaEvalSession
