@@ -63,7 +63,7 @@ def pack(value: Any) -> bytes:
 
 
 def unpack(content: bytes) -> Any:
-    """Return the value in a message; a damaged one raises ValueError, TypeError or KeyError."""
+    """Return the value in a message; a damaged one raises one of `DAMAGED` (`sessions.py`)."""
     return msgpack.unpackb(content, object_hook=_from_map)
 
 
@@ -79,7 +79,7 @@ def _from_map(value: dict[Any, Any]) -> Any:
         return value[b"data"]
     if _ARRAY not in value:
         return value
-    dtype = np.dtype(value[b"dtype"])
+    dtype = np.dtype(str(value[b"dtype"]))
     if dtype.kind not in "biuf":  # others could run code when they are created
         raise ValueError(f"an array of {dtype}")
     return np.frombuffer(value[b"data"], dtype).reshape(value[b"shape"])

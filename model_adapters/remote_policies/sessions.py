@@ -15,6 +15,8 @@ from model_adapters.options.policies import SocketPolicyOptions
 from model_adapters.protocols import ArmDelta, ArmObservation, Capabilities, Episode
 from model_adapters.remote_policies.actions import Convention
 
+# What msgpack and numpy raise on damaged messages.
+DAMAGED = (ValueError, TypeError, KeyError, OverflowError, SyntaxError)
 _LARGEST = 16 * 2**20  # bytes of the largest accepted message
 _FIRST_WAIT_S = 0.5  # pause before the second attempt; it doubles before each further one
 _CLOSE_S = 1.0  # that a server is waited for when a connection is closed
@@ -91,7 +93,7 @@ class Session:
         raise NotImplementedError
 
     def _unpack(self, content: bytes) -> Any:
-        """Return what is in a message; raises ValueError, TypeError or KeyError."""
+        """Return what is in a message; a damaged one raises one of `DAMAGED`."""
         raise NotImplementedError
 
     def _send(self, content: bytes) -> None:
@@ -107,8 +109,7 @@ class Session:
             line = content.strip().rpartition("\n")[2]
             raise ModelError(f"{self.server} answers with the text {line!r}; see its log")
         problem = f"{self.server} sends no message of its protocol"
-        broken = (ValueError, TypeError, KeyError)
-        with wrap_errors(problem, "is it another server?", catch=broken, raise_as=ModelError):
+        with wrap_errors(problem, "is it another server?", catch=DAMAGED, raise_as=ModelError):
             return self._unpack(content)
 
     def _connected(self) -> Any:
@@ -141,10 +142,11 @@ class Session:
             yield
         except passing:
             raise
-        except TimeoutError as error:
-            late = f"{self.server} does not answer within {self._options.timeout_s:g} s"
-            raise ModelError(f"{late}; raise timeout_s if it is slow") from error
-        except (self._errors, ImportError) as error:  # ImportError: of a SOCKS proxy's package
+        except (TimeoutError, self._errors, ImportError) as error:
+            # ImportError: of a SOCKS proxy's package. A cause: of what cannot be sent.
+            if isinstance(error, TimeoutError) or isinstance(error.__cause__, TimeoutError):
+                late = f"{self.server} does not answer within {self._options.timeout_s:g} s"
+                raise ModelError(f"{late}; raise timeout_s if it is slow") from error
             ended = f"{self.server} ends the connection ({in_one_line(error)})"
             raise ModelError(f"{ended}; see its log") from error
 

@@ -1,13 +1,17 @@
 """Servers of vla-eval's protocol that lie: each fails its episode in one line, and no other."""
 
+import socket
 import threading
 import time
+from dataclasses import replace
 
 import msgpack
 import numpy as np
 import pytest
+from PIL import Image
 
 from infthor_eval.errors import UsageError
+from infthor_eval.formats.frames import FrameRef
 
 from .conftest import refusal, run
 
@@ -146,6 +150,41 @@ def test_a_late_answer_is_not_waited_for_nor_taken_for_the_next(meanwhile, liar,
     done.set()
     ((step,),) = run(policy, [shot])
     assert step.translation == pytest.approx((0.05, 0, 0))
+
+
+@pytest.mark.parametrize("is_main", [True, False])
+def test_a_server_that_reads_nothing_is_not_waited_for(
+    is_main, websocket_server, connect, shot, tmp_path
+):
+    done = threading.Event()
+
+    def deaf(connection, number):
+        connection.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        server = Server(connection)
+        server.send("hello", HELLO, 1)
+        connection.recv_flow_control.acquire()
+        done.wait()
+        connection.recv_flow_control.release()
+
+    policy = connect("vla-eval", websocket_server(deaf), timeout_s=0.4)
+    policy._here.session._socket.socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)
+    noise = np.random.default_rng(0).integers(0, 256, (1000, 1000, 3), dtype=np.uint8)
+    Image.fromarray(noise).save(tmp_path / "noise.png")
+    large = replace(shot, image=FrameRef(tmp_path / "noise.png"))
+    said = []
+
+    def act():
+        policy._here.session = next(iter(policy._sessions))
+        said.append(refusal(run, policy, [large]))
+
+    thread = threading.Thread(target=act)
+    if is_main:
+        act()
+    else:
+        thread.start()
+        thread.join()
+    done.set()
+    assert "does not answer within 0.4 s" in said[0]
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """The client of openpi's server, against a double that speaks its wire."""
 
+import contextlib
 import subprocess
 import sys
 from dataclasses import replace
@@ -7,9 +8,12 @@ from dataclasses import replace
 import msgpack
 import numpy as np
 import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
 
 from model_adapters import check_adapter
 from model_adapters.remote_policies.openpi import pack, unpack
+from model_adapters.remote_policies.sessions import DAMAGED
 
 from .conftest import refusal, run
 
@@ -118,6 +122,16 @@ def test_arrays_go_over_the_wire_as_they_are(dtype):
     back = unpack(pack({"a": [array], "b": "text"}))
     assert back["b"] == "text"
     assert (back["a"][0].dtype, back["a"][0].tolist()) == (array.dtype, array.tolist())
+
+
+MESSAGE = pack({"actions": ACTIONS, "server_timing": {"infer_ms": 1.5}})
+
+
+@given(at=st.integers(0, len(MESSAGE) - 1), put=st.binary(max_size=3), cut=st.integers(0, 3))
+@example(at=MESSAGE.index(b"<f4"), put=b"(1,", cut=3)  # a SyntaxError of numpy
+def test_a_damaged_message_is_told_from_others(at, put, cut):
+    with contextlib.suppress(DAMAGED):
+        unpack(MESSAGE[:at] + put + MESSAGE[at + cut :])
 
 
 def test_an_array_is_written_with_the_markers_of_the_published_client():
