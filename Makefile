@@ -12,6 +12,9 @@ DEVELOPED := $(VENV)/.developed
 PEERS := $(VENV)/test-peers
 # inspect_ai reads the logs that `export` writes; eighty other packages come with it, so it has an environment of its own.
 INSPECT := $(VENV)/inspect-ai
+# vla-eval's own servers answer its client; a folder apart, as twenty other packages come with it, and others take
+# websockets where they see it.
+VLA_EVAL := $(VENV)/vla-eval
 # The renderer is compiled once; otherwise each process that finds it missing would compile it.
 COMPILED := $(VENV)/.compiled
 
@@ -55,16 +58,16 @@ $(COMPILED): $(DEVELOPED) $(wildcard infthor_sim/render/*.py)
 		-k "test_questions or test_ids_frame_names or numba"
 	touch $@
 
-test: $(COMPILED) $(PEERS) $(INSPECT)
+test: $(COMPILED) $(PEERS) $(INSPECT) $(VLA_EVAL)
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder -m "not slow"
 
 # The slow ones too; 2.3 hours of one core, so more than an hour on two. TESTS: some of them.
 TESTS ?= tests
-test-all: $(COMPILED) $(PEERS) $(INSPECT)
+test-all: $(COMPILED) $(PEERS) $(INSPECT) $(VLA_EVAL)
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 3 --dist loadfile --no-loadscope-reorder $(TESTS)
 
 # Measures all tests, and lists those that are slow in tests/slow_tests.txt.
-test-times: $(COMPILED) $(PEERS) $(INSPECT)
+test-times: $(COMPILED) $(PEERS) $(INSPECT) $(VLA_EVAL)
 	rm -rf build/processor_times
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder -p tests.processor_times
 	$(BIN)/python -m tests.processor_times
@@ -151,6 +154,10 @@ $(DEVELOPED): $(INSTALLED)
 
 $(PEERS): $(DEVELOPED)
 	$(BIN)/$(PIP) -c constraints.txt --no-deps --upgrade --target $@ torchvision
+	touch $@
+
+$(VLA_EVAL): $(DEVELOPED)
+	$(BIN)/$(PIP) -c constraints.txt --no-deps --upgrade --target $@ vla-eval websockets lazyregistry
 	touch $@
 
 $(INSPECT):
