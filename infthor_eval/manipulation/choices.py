@@ -23,7 +23,7 @@ class ChoiceResults(msgspec.Struct, frozen=True):
             which the other one was: 0 on average for an arm that does not know the world.
         pair_accuracy: share of pairs in which it was taken in both.
         pairs_exchanged: share of pairs in which the other one was.
-        chosen: net pairs by the thing that the hand was nearer to in the end, taken or not.
+        chosen: net pairs by the thing that the hand took, or else was nearer to in the end.
     """
 
     n_pairs: int

@@ -271,12 +271,15 @@ class ArmEnvironment:
         return ArmEnded.DONE if self._wanted in held else None
 
     def nears_other(self) -> bool | None:
-        """Return whether the hand is nearer to the other of two things than to the one that is
-        named; None if there are no two."""
+        """Return whether the hand has, or is nearer to, the other of two things and not the one
+        that is named; None if there are no two."""
         choice = self.episode.choice
         if choice is None:
             return None
-        hand = point_of(arm_of(self.view).sphere_center)
+        arm = arm_of(self.view)
+        if (self._wanted in arm.held) != (choice.other in arm.held):
+            return choice.other in arm.held
+        hand = point_of(arm.sphere_center)
         named, other = (
             distance_to(hand, self.view.objects[key]) for key in (self._wanted, choice.other)
         )

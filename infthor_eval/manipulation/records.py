@@ -69,8 +69,8 @@ class ArmRecord(
         put_criterion: when a put succeeds.
         pair: name of the pair of choices between two things that it is of; empty for others.
         base: what both worlds of the pair are made of; likewise.
-        nears_other: whether the hand was nearer in the end to the other thing than to the one that
-            is named; None for others.
+        nears_other: whether the hand had, or was nearer to, the other thing in the end and not the
+            one that is named; None for others.
     """
 
     instruction: str

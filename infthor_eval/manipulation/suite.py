@@ -40,7 +40,7 @@ _FLOOR = (
 _CHOICES = ("net pairs", "right", "exchanged", "chosen, net", "pairs", "incomplete")
 _CHOSEN = (
     "Net pairs: the thing that is named taken in both worlds, less the other one in both; 0 on "
-    "average without memory. Chosen: by the thing that the hand was nearer to in the end."
+    "average without memory. Chosen: by what the hand took, or else was nearer to in the end."
 )
 # Columns of the success table that the overview has: those before what was left out.
 _N_OVERVIEW = 6

@@ -31,7 +31,7 @@ from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import SimulatorView
 
 KIND = "bring"
-_MOST_ERRANDS = 24  # that are tried in one trajectory's rooms
+_MOST_ERRANDS = 48  # that are tried in one trajectory's rooms
 _SIDES = ("left", "right")
 _AROUND = ("RotateRight",) * 4
 _AND_BACK = ("RotateLeft", "RotateRight")
