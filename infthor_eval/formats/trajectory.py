@@ -274,7 +274,7 @@ def read_trajectory(path: SetPath) -> Trajectory:
     return TrajectorySource(path, None, read_bytes(path, _HINT)).read()
 
 
-def iter_sources(path: Path) -> Iterator[TrajectorySource]:
+def iter_sources(path: SetPath) -> Iterator[TrajectorySource]:
     """Yield trajectories, not decoded, of a file (`.json`, `.jsonl`, `.jsonl.gz`) or of a folder.
 
     They come in the order of file names and lines.
@@ -282,13 +282,12 @@ def iter_sources(path: Path) -> Iterator[TrajectorySource]:
     Raises:
         DataError: a file is missing, unreadable or of another kind, or the folder has no such file.
     """
-    path = Path(path)
-    if path.is_dir():
+    if isinstance(path, Path) and path.is_dir():
         for file in trajectory_files(path):
             yield from iter_sources(file)
     elif path.name.endswith(".json"):
         yield TrajectorySource(path, None, read_bytes(path, _HINT))
-    elif path.name.endswith((".jsonl", ".jsonl.gz")):
+    elif isinstance(path, Path) and path.name.endswith((".jsonl", ".jsonl.gz")):
         yield from (TrajectorySource(path, line, raw) for line, raw in lines_of(path, _HINT))
     else:
         raise DataError(

@@ -142,9 +142,9 @@ def test_twins_are_built_again_byte_for_byte(folder, pairs, tmp_path):
     the two that sets/README.md names, whose episodes are drawn otherwise today."""
     manifest = _manifest()
     part = msgspec.structs.replace(manifest, trajectories=manifest.trajectories[2:3])
-    strict = partial(score, scorer="strict")
-    built, numbers = build_twins(part, strict, tmp_path / "one", WorkerSettings())
-    again, _ = build_twins(part, strict, tmp_path / "other", WorkerSettings())
+    draft = partial(draft_twins, score=partial(score, scorer="strict"))
+    built, numbers = build_twins(part, draft, tmp_path / "one", WorkerSettings())
+    again, _ = build_twins(part, draft, tmp_path / "other", WorkerSettings())
     assert differing_files(built, again) == []
     assert numbers.trajectories == 1
     made = {pair.id: pair for pair in read_pairs(tmp_path / "one")}

@@ -30,7 +30,9 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from infthor_eval.formats.question import Question
-    from infthor_eval.generation.twins.twin_set import FinalTaskSummary, TwinSummary
+    from infthor_eval.generation.twins.drafting import TwinSettings
+    from infthor_eval.generation.twins.twin_set import DraftTwins, FinalTaskSummary, TwinSummary
+    from infthor_eval.thor.launch import Launch
 
 
 @example_command("questions", "infthor-eval questions SET --out SET/qa_set_mine.csv")
@@ -252,12 +254,9 @@ def twins(
     """
 
     from infthor_eval.generation.arm_twins.drafting import KIND as ARM_KIND
-    from infthor_eval.generation.arm_twins.drafting import draft_arm_twins
     from infthor_eval.generation.replay_set import select
-    from infthor_eval.generation.twins.drafting import TwinSettings, draft_twins
+    from infthor_eval.generation.twins.drafting import TwinSettings
     from infthor_eval.generation.twins.twin_set import make_final_tasks, make_twins
-    from infthor_eval.manipulation.reach import PlannerReach
-    from infthor_eval.nieh.scoring import score
     from infthor_eval.thor import launch
     from infthor_eval.thor.supplement import supplement_file
 
@@ -279,9 +278,7 @@ def twins(
         launched = launch.unity_launch() if unity else launch.embedded_launch(data, supplement)
         make: Callable[..., TwinSummary | FinalTaskSummary] = make_final_tasks
         if not final_tasks:
-            draft = partial(draft_twins, score=partial(score, scorer="strict"))
-            if arms:
-                draft = partial(draft_arm_twins, reaches=PlannerReach(launched))
+            draft = drafting_of(settings, launched)
             make = partial(make_twins, draft=draft, per_trajectory=per_trajectory)
         summary = make(
             selection,
@@ -301,6 +298,18 @@ def twins(
     for line in summary.failures:
         notes.print(f"no twins: {line}", style="red")
     context.exit(1 if summary.failures else 0)
+
+
+def drafting_of(settings: TwinSettings, launched: Launch) -> DraftTwins:
+    """Return what makes twins of a trajectory by these settings, in this simulator."""
+    from infthor_eval.generation.arm_twins.drafting import KIND, draft_arm_twins
+    from infthor_eval.generation.twins.drafting import draft_twins
+    from infthor_eval.manipulation.reach import PlannerReach
+    from infthor_eval.nieh.scoring import score
+
+    if settings.kinds == (KIND,):
+        return partial(draft_arm_twins, reaches=PlannerReach(launched))
+    return partial(draft_twins, score=partial(score, scorer="strict"))
 
 
 def parse_kinds(names: str | None, final_tasks: bool = False) -> tuple[str, ...]:
