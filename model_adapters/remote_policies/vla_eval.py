@@ -40,6 +40,7 @@ class VlaEvalSession(Session):
         """See `Session`; the server says nothing if it agrees."""
         super().begin(episode)
         self._n_observations = 0
+        self._history = episode.history
         self._started = time.monotonic()
         task = {
             "name": episode.name,
@@ -108,6 +109,9 @@ class VlaEvalSession(Session):
         if observation.state is not None:  # servers read one key or the other
             vector = state_vector(observation.state, self._state_format)
             content |= {"states": vector, "state": vector}
+        if self._history and not self._n_observations:  # as RoboMME of the package tells it
+            history = [np.asarray(frame.load()) for frame in self._history]
+            content["video_history"] = history
         self._n_observations += 1
         return self._answer("OBSERVATION", "ACTION", content)
 

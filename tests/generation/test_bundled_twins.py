@@ -21,6 +21,7 @@ from infthor_eval.generation.bundle import (
     digests_of,
     read_manifest,
 )
+from infthor_eval.generation.twins.drafting import draft_twins
 from infthor_eval.nieh.scoring import score
 from infthor_eval.storage.digests import digest_of_file
 from infthor_eval.storage.folders import packaged_folder
