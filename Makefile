@@ -12,8 +12,8 @@ DEVELOPED := $(VENV)/.developed
 PEERS := $(VENV)/test-peers
 # inspect_ai reads the logs that `export` writes; eighty other packages come with it, so it has an environment of its own.
 INSPECT := $(VENV)/inspect-ai
-# Harnesses whose world our household is: folders apart, as a dozen other packages come with them, and others take
-# websockets where they see it.
+# vla-eval's own servers answer its client, and its command and inspect-robots' drive our arms; folders apart, as twenty
+# other packages come with them, and others take websockets where they see it.
 VLA_EVAL := $(VENV)/vla-eval
 ROBOTS := $(VENV)/inspect-robots
 # The renderer is compiled once; otherwise each process that finds it missing would compile it.

@@ -11,7 +11,15 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from pandas import DataFrame
 
-__all__ = ["__version__", "evaluate", "load_figure", "load_run", "load_runs", "load_sample"]
+__all__ = [
+    "Evaluator",
+    "__version__",
+    "evaluate",
+    "load_figure",
+    "load_run",
+    "load_runs",
+    "load_sample",
+]
 
 __version__ = "0.1.0"
 
@@ -109,12 +117,13 @@ def load_figure(
     return figure
 
 
-def evaluate(model: str, tasks: str | list[str], **options: Any) -> DataFrame:
+def evaluate(model: Any, tasks: str | list[str], **options: Any) -> DataFrame:
     """Evaluate models on tasks as `infthor-eval --model MODEL --tasks TASKS` does, and continue a
     run that was stopped.
 
     Args:
-        model: names of models with commas between them.
+        model: names of models with commas between them; or a model or policy that is an object,
+            whose run begins anew and is kept only where `out` says.
         tasks: names of tasks, likewise or as a list.
         options: options of the command: `limit=20`, `data="my_set"`, `greedy=True`,
             `model_args={"pretrained": "PATH"}`.
@@ -129,5 +138,14 @@ def evaluate(model: str, tasks: str | list[str], **options: Any) -> DataFrame:
     from infthor_eval.plugins import import_target
 
     run = import_target("infthor_eval.cli.evaluation:evaluate")
-    frame: DataFrame = run({"model": model, "tasks": tasks, **options})
+    frame: DataFrame = run(model, {"tasks": tasks, **options})
     return frame
+
+
+def __getattr__(name: str) -> Any:
+    """Return `Evaluator`, which is imported when it is asked for."""
+    if name != "Evaluator":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from infthor_eval.cli.evaluation import Evaluator
+
+    return Evaluator

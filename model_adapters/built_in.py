@@ -15,6 +15,8 @@ _ANY = "any image-text model of transformers with a chat template (pretrained=NA
 _ANY_TEXT = "any language model of transformers, for texts alone (pretrained=NAME)"
 _SERVED = "any model behind a server of this dialect (model=NAME)"
 _HTTP = "any policy behind a server of OpenVLA's convention, /act (url=ADDRESS)"
+_VLA_EVAL = "any policy behind a model server of vla-eval (url=ADDRESS)"
+_OPENPI = "any policy behind openpi's server (url=ADDRESS)"
 _PERSON = "a person, who answers on a page of this machine"
 _NANO = "small, trained, bundled with the package"
 
@@ -142,6 +144,7 @@ BUILT_IN = {
     # All its images are seen together, so that prefixes cannot be shared.
     "molmo2": _named("allenai/Molmo2-8B", "molmo2", share_prefix=False),
     "openai": _locate("served.adapters:OpenAI", "served.options:OpenAIOptions", _SERVED),
+    "openpi": _locate("remote_policies.openpi:OpenPi", "options.policies:OpenPiOptions", _OPENPI),
     "openvla": _OPENVLA,
     "openvla@vllm": _on_vllm("openvla:OpenVLAOnVllm", "OpenVLAOnVllmOptions", _OPENVLA),
     "openvla-tiny": _tiny("openvla:OpenVLATiny", "policies:OpenVLATinyOptions"),
@@ -170,5 +173,8 @@ BUILT_IN = {
         pretrained="IPEC-COMMUNITY/spatialvla-4b-224-pt",
     ),
     "spatialvla-tiny": _tiny("spatialvla:SpatialVLATiny", "policies:SpatialVLAOptions"),
+    "vla-eval": _locate(
+        "remote_policies.vla_eval:VlaEval", "options.policies:SocketPolicyOptions", _VLA_EVAL
+    ),
     "vla-http": _locate("policies.http.adapter:VlaHttp", "options.policies:VlaHttpOptions", _HTTP),
 }

@@ -341,11 +341,13 @@ class Episode:
         name: name of the episode in its run.
         instruction: the task in words ("pick up the mug").
         max_steps: most steps of the arm.
+        history: frames of what happened before, in order, where the instruction is about that.
     """
 
     name: str
     instruction: str
     max_steps: int
+    history: tuple[FrameRef, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,8 @@
 """Evaluation of episodes in simulators: what plans and manipulation have in common."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Mapping
-from contextlib import ExitStack
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from importlib.metadata import version
@@ -77,6 +77,7 @@ class EpisodeEvaluation(ABC, Generic[Options, K, U]):
             file.name: read_task(file, request) for file in request.tasks
         }
         self._scenes = Path(self.options.scenes) if self.options.scenes is not None else None
+        self._kept: dict[tuple[Any, ...], Simulators] | None = None
         self._floor_plans = floor_plans_digest(self._scenes) if self._scenes is not None else None
         by_name = {
             trajectory.traj_id: trajectory.data
@@ -130,7 +131,26 @@ class EpisodeEvaluation(ABC, Generic[Options, K, U]):
 
     def simulators(self, **options: Any) -> Simulators:
         """Return simulators for the episodes, with further options of `Simulator`."""
-        return Simulators(self.options.simulator, self._scenes, self.trajectories, **options)
+        key = tuple(sorted(options.items()))
+        if self._kept is None or key not in self._kept:
+            made = Simulators(self.options.simulator, self._scenes, self.trajectories, **options)
+            if self._kept is None:
+                return made
+            made.is_kept = True
+            self._kept[key] = made
+        return self._kept[key]
+
+    @contextmanager
+    def keeping_simulators(self) -> Iterator[None]:
+        """Within this context, runs that follow each other use the same simulators."""
+        self._kept = {}
+        try:
+            yield
+        finally:
+            for simulators in self._kept.values():
+                simulators.is_kept = False
+                simulators.close()
+            self._kept = None
 
 
 class BoundEpisodes(Generic[U, P]):

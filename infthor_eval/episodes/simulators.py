@@ -16,7 +16,11 @@ _COPIES = 512  # of the simulator's state: one for each plan of a long trajector
 
 
 class Simulators:
-    """Starts simulators as they are needed, and stops them at `close` or when nobody holds this."""
+    """Starts simulators as they are needed, and stops them at `close` or when nobody holds this.
+
+    Attributes:
+        is_kept: whether they stay open when a run closes them, for the next one.
+    """
 
     def __init__(
         self, name: str, scenes: Path | None, trajectories: Sequence[Trajectory], **options: Any
@@ -28,6 +32,7 @@ class Simulators:
             scenes: folder of recorded floor plans, for the embedded one.
             trajectories: trajectories whose objects complete the recorded floor plans.
         """
+        self.is_kept = False
         self._options = options
         self._open = ExitStack()
         weakref.finalize(self, self._open.close)
@@ -54,5 +59,6 @@ class Simulators:
             self._idle.put(simulator)
 
     def close(self) -> None:
-        """Stop them all; safe to call again."""
-        self._open.close()
+        """Stop them all, unless they are kept for another run; safe to call again."""
+        if not self.is_kept:
+            self._open.close()

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Generic, TypeVar
 
 from infthor_eval.errors import DataError, UsageError
+from infthor_eval.formats.packed.paths import metadata_folder
 from infthor_eval.formats.trajectory import (
     Trajectory,
     TrajectorySource,
@@ -128,7 +129,10 @@ def _sources(root: Path, broken: _Broken) -> Iterator[TrajectorySource]:
 
     The trajectories of an NIEH set are beside the logs of their replay.
     """
-    for path in sorted(root.glob("metadata/*/traj_data.json")) or trajectory_files(root):
+    logs = metadata_folder(root)
+    of_set = [path / "traj_data.json" for path in logs.iterdir()] if logs.is_dir() else []
+    replayed = sorted((path for path in of_set if path.is_file()), key=str)
+    for path in replayed or trajectory_files(root):
         try:
             yield from iter_sources(path)
         except DataError as error:

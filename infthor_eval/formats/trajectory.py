@@ -17,7 +17,7 @@ from msgspec import Meta
 from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.packed.paths import SetPath
 from infthor_eval.formats.reading import lines_of, read_bytes
-from infthor_eval.formats.twins import TwinWorld
+from infthor_eval.formats.twins import ArmChoice, TwinWorld
 from infthor_eval.storage.digests import digest
 from infthor_eval.storage.limits import OBJECT_POSES
 
@@ -204,7 +204,7 @@ class SubTrajectory(_Fields, omit_defaults=False):
 class Trajectory(_Fields):
     """One trajectory; not all formats have the fields below `plan` (see the module's docstring).
 
-    `twin` is our addition, for pairs of twins with a final task.
+    `twin` and `arm_choices` are our additions, for pairs of twins with a final task, and of arms.
     """
 
     scene: Scene
@@ -223,6 +223,7 @@ class Trajectory(_Fields):
     turk_annotations: dict[str, Any] | None = None
     gen_info: dict[str, Any] | None = None
     twin: TwinWorld | None = None
+    arm_choices: list[ArmChoice] = msgspec.field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -273,7 +274,7 @@ def read_trajectory(path: SetPath) -> Trajectory:
     return TrajectorySource(path, None, read_bytes(path, _HINT)).read()
 
 
-def iter_sources(path: Path) -> Iterator[TrajectorySource]:
+def iter_sources(path: SetPath) -> Iterator[TrajectorySource]:
     """Yield trajectories, not decoded, of a file (`.json`, `.jsonl`, `.jsonl.gz`) or of a folder.
 
     They come in the order of file names and lines.
@@ -281,13 +282,12 @@ def iter_sources(path: Path) -> Iterator[TrajectorySource]:
     Raises:
         DataError: a file is missing, unreadable or of another kind, or the folder has no such file.
     """
-    path = Path(path)
-    if path.is_dir():
+    if isinstance(path, Path) and path.is_dir():
         for file in trajectory_files(path):
             yield from iter_sources(file)
     elif path.name.endswith(".json"):
         yield TrajectorySource(path, None, read_bytes(path, _HINT))
-    elif path.name.endswith((".jsonl", ".jsonl.gz")):
+    elif isinstance(path, Path) and path.name.endswith((".jsonl", ".jsonl.gz")):
         yield from (TrajectorySource(path, line, raw) for line, raw in lines_of(path, _HINT))
     else:
         raise DataError(

@@ -134,6 +134,24 @@ class TwinWorld(msgspec.Struct, frozen=True):
     places: tuple[TwinPlace, TwinPlace]
 
 
+class ArmChoice(msgspec.Struct, frozen=True):
+    """What an arm is told at the end of a world, where it stands before two things.
+
+    Attributes:
+        pair: name of the pair of choices; the other one is in the twin world.
+        base: hash of the trajectory whose rooms the worlds are in; its pairs are one cluster.
+        instruction: the task in words.
+        target: id of the thing that it names in this world, by what happened there.
+        other: id of the other thing.
+    """
+
+    pair: str
+    base: str
+    instruction: str
+    target: str
+    other: str
+
+
 def has_pairs(folder: Path) -> bool:
     """Return True if a set has a file of pairs of worlds."""
     return (folder / _TWINS).is_file()

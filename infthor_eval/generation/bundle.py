@@ -36,8 +36,7 @@ from infthor_eval.generation.questions.generate import GeneratedQuestions, gener
 from infthor_eval.generation.replay_set import replay_set, select
 from infthor_eval.generation.settings import TrajectorySettings
 from infthor_eval.generation.twins.drafting import TwinSettings
-from infthor_eval.generation.twins.pairing import ScoreReply
-from infthor_eval.generation.twins.twin_set import TwinSummary, make_twins
+from infthor_eval.generation.twins.twin_set import DraftTwins, TwinSummary, make_twins
 from infthor_eval.generation.twins.undrawn import copy_questions, pack_worlds
 from infthor_eval.storage.digests import digest_of_file, digest_of_files, fingerprint
 from infthor_eval.storage.files import remove, write_atomically
@@ -167,7 +166,7 @@ def build_bundle(
 
 def build_twins(
     manifest: TwinsManifest,
-    score: ScoreReply,
+    draft: DraftTwins,
     out: Path,
     worker_settings: WorkerSettings,
     advance: Callable[[bool], None] = lambda _: None,
@@ -176,7 +175,7 @@ def build_twins(
 
     Args:
         manifest: the manifest; its digests are not used.
-        score: the strict score of a reply.
+        draft: makes the twins of a trajectory.
         out: folder of the set: new, empty, or with a build that was stopped.
         worker_settings: number and place of the workers; they do not change the set.
         advance: called twice for each trajectory, with True if it is of an earlier run.
@@ -192,7 +191,7 @@ def build_twins(
             embedded_launch(),
             work / _REPLAYED,
             manifest.twins,
-            score,
+            draft,
             per_trajectory=manifest.per_trajectory,
             worker_settings=worker_settings,
             advance=advance,

@@ -96,6 +96,15 @@ class Rollout:
         self._walker.step_aside(receptacle)
         self._interact("PutObject", item, receptacle)
 
+    def put_here(self, item: str, receptacle: str) -> None:
+        """Put a held object into an open receptacle in one sub-goal, from where the agent stands.
+
+        Raises:
+            RolloutError: as `run`.
+        """
+        self._begin("PutObject", item, receptacle)
+        self._interact("PutObject", item, receptacle)
+
     # -- sub-goals
 
     def _pickup_or_slice(self, operator: Operator) -> None:

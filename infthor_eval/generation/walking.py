@@ -37,12 +37,30 @@ class Walker:
         viewpoint = self._viewpoint(object_ids, inside)
         if self._moves(viewpoint) == []:
             return
+        self._begin(viewpoint, target.object_id)
+        self._walk(viewpoint, object_ids)
+
+    def stand(self, viewpoint: Viewpoint, towards: str) -> None:
+        """Walk to a pose, a sub-goal that names an object.
+
+        Raises:
+            RolloutError: there is no path to it.
+        """
+        self._begin(viewpoint, towards)
+        self._walk(viewpoint, [])
+
+    def turn_around(self) -> None:
+        """Turn once about, in the current sub-goal."""
+        for _ in range(360 // _TURN):
+            self._move("RotateRight")
+
+    def _begin(self, viewpoint: Viewpoint, towards: str) -> None:
         x, z = viewpoint.pose.cell
         facing = viewpoint.pose.facing
         location = f"loc|{x}|{z}|{facing // _TURN}|{viewpoint.horizon}"
-        action = PlannerAction("GotoLocation", location=location, object_id=target.object_id)
-        self._trace.begin([compact_name(target.object_type)], action)
-        self._walk(viewpoint, object_ids)
+        action = PlannerAction("GotoLocation", location=location, object_id=towards)
+        words = [compact_name(self._trace.view.objects[towards].object_type)]
+        self._trace.begin(words, action)
 
     def step_aside(self, item: str, inside: str | None = None) -> None:
         """Walk to where an object can be acted on, within the current sub-goal; see `go`."""
@@ -65,7 +83,7 @@ class Walker:
     def _walk(self, viewpoint: Viewpoint, object_ids: list[str]) -> None:
         # A refused step changes nothing and is not part of the trajectory. Its cell is removed from
         # the grid, so that the next path leads around it.
-        target = self._trace.view.objects[object_ids[0]].object_type
+        target = self._trace.view.objects[object_ids[0]].object_type if object_ids else "the place"
         while (moves := self._moves(viewpoint)) is not None:
             if all(self._move(action) for action in moves):
                 break

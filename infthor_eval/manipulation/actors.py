@@ -86,8 +86,11 @@ class PolicyActor:
 
     def begin(self, situation: ArmSituation) -> None:
         """See `ArmActor`."""
-        self._instruction = situation.episode.instruction
-        self._policy.begin(situation.episode)
+        episode = situation.episode
+        self._instruction = episode.instruction
+        if self._blank:
+            episode = replace(episode, history=tuple(map(blank_like, episode.history)))
+        self._policy.begin(episode)
 
     def act(self, seen: ArmObservation | None) -> Sequence[Step]:
         """See `ArmActor`."""
@@ -132,7 +135,9 @@ class _StillActor(_BaselineActor):
     def begin(self, situation: ArmSituation) -> None:
         environment = situation.environment
         is_pickup = environment.episode.kind == ManipulationKind.PICKUP
-        take: Call = {"action": "PickupObject", "objectIdCandidates": [environment.start.object_id]}
+        take: Call = {"action": "PickupObject"}
+        if not environment.takes_all:
+            take["objectIdCandidates"] = [environment.start.object_id]
         self._left: list[Step] = [[take if is_pickup else {"action": "ReleaseObject"}]]
 
     def act(self, seen: ArmObservation | None) -> Sequence[Step]:

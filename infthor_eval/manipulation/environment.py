@@ -151,6 +151,7 @@ class ArmEnvironment:
         missing &= {start.object_id, start.receptacle_id}
         if missing:
             raise InfeasibleError(f"{min(map(str, missing))} cannot be brought to where it was")
+        self._wanted = start.object_id
         self._target = start.view.objects[start.receptacle_id or start.object_id]
         pose = start.view.agent if grasp.stand is Stand.EXPERT else start.before_the_way
         # An agent with an arm has another height than the default one, so the expert's y is not
@@ -253,14 +254,41 @@ class ArmEnvironment:
         return [{"action": "PickupObject", "objectIdCandidates": [target]}]
 
     def _ending(self, released: bool) -> ArmEnded | None:
-        target = self.start.object_id
+        target = self._wanted
         if self.episode.kind == ManipulationKind.PICKUP:
-            return ArmEnded.DONE if target in arm_of(self._simulator.view).held else None
+            return self._taken(set(arm_of(self._simulator.view).held))
         if not released or target in arm_of(self._simulator.view).held:
             return None
         self._settle()
         is_there = is_in(target, str(self.start.receptacle_id), self._simulator.view)
         return ArmEnded.DONE if is_there else ArmEnded.ELSEWHERE
+
+    def _taken(self, held: set[str]) -> ArmEnded | None:
+        """Return how an episode ended in which the hand holds these; None if it goes on."""
+        choice = self.episode.choice
+        if choice is not None and choice.other in held:
+            return ArmEnded.OTHER
+        return ArmEnded.DONE if self._wanted in held else None
+
+    def nears_other(self) -> bool | None:
+        """Return whether the hand has, or is nearer to, the other of two things and not the one
+        that is named; None if there are no two."""
+        choice = self.episode.choice
+        if choice is None:
+            return None
+        arm = arm_of(self.view)
+        if (self._wanted in arm.held) != (choice.other in arm.held):
+            return choice.other in arm.held
+        hand = point_of(arm.sphere_center)
+        named, other = (
+            distance_to(hand, self.view.objects[key]) for key in (self._wanted, choice.other)
+        )
+        return other < named
+
+    @property
+    def takes_all(self) -> bool:
+        """Whether the hand takes everything in its sphere."""
+        return self._grasp.takes_all
 
     def _settle(self) -> None:
         """Wait until released objects lie still; in the embedded simulator they do at once."""

@@ -7,14 +7,16 @@ from functools import partial
 import msgspec
 
 from infthor_eval.episodes.evaluation import BoundEpisodes, EpisodeEvaluation, EpisodeUnit
+from infthor_eval.episodes.retries import with_retries
 from infthor_eval.episodes.running import EpisodeResult, EpisodeRunner
 from infthor_eval.episodes.simulators import Simulators
 from infthor_eval.errors import SceneError, UsageError
+from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.manipulation.actors import ArmActor, ArmBaseline, ArmSituation, PolicyActor, Step
 from infthor_eval.manipulation.config import ManipulationConfig
 from infthor_eval.manipulation.environment import ArmEnvironment, ArmOutcome, arm_of
-from infthor_eval.manipulation.expert import ExpertStates, expert_states
+from infthor_eval.manipulation.expert import ExpertStates, replay_expert
 from infthor_eval.manipulation.kinds import PutCriterion, Senses
 from infthor_eval.manipulation.options import ManipulationOptions
 from infthor_eval.manipulation.records import ArmEnded, ArmRecord, ArmStep
@@ -66,10 +68,6 @@ class ManipulationEvaluation(EpisodeEvaluation[ManipulationOptions, Manipulation
             raise TypeError(f"{subject} is neither a policy nor a baseline of manipulation")
         return BoundManipulation(self, create_actor, sees=not isinstance(subject, ArmBaseline))
 
-    def expert_simulators(self) -> Simulators:
-        """Return simulators for the trajectories' expert."""
-        return self.simulators(image=False, instances=False)
-
     def arm_simulators(self, *, image: bool) -> dict[Camera, Simulators]:
         """Return simulators with an arm for each camera of the tasks; `image` if they draw."""
         by_camera = {
@@ -111,7 +109,8 @@ class BoundManipulation(BoundEpisodes[ArmUnit, ArmRecord]):
         self._create_actor = create_actor
         self._sees = sees
         self._senses = evaluation.options.senses
-        self._experts = evaluation.expert_simulators()
+        self._tells_history = sees and any(task.tells_history for task in self._tasks.values())
+        self._experts = evaluation.simulators(image=self._tells_history, instances=False)
         self._arms = evaluation.arm_simulators(image=sees)
         # The episodes of all tasks by trajectory, in time order: one replay of its expert serves
         # them all.
@@ -144,26 +143,38 @@ class BoundManipulation(BoundEpisodes[ArmUnit, ArmRecord]):
         arms: Simulators,
         session: Session[ArmRecord],
     ) -> Iterator[UnitRecord[ArmRecord]]:
-        trajectory = units[0].trajectory.data
-        try:
-            states, faults = expert_states(trajectory, self._experts)
-        except SceneError as error:
-            yield from (unit.record_exclusion(str(error), fingerprints[unit.key]) for unit in units)
-            return
-        with arms.one() as simulator:
-            runner = ArmRunner(
-                trajectory,
-                states,
-                simulator,
-                self._create_actor(),
-                senses=self._senses if self._sees else None,
-                seed=self.seed,
-            )
-            for unit in units:
-                run = partial(runner.run, self._tasks[unit.key.task], unit.episode)
-                record = runner.record(unit, fingerprints[unit.key], run, session)
-                yield msgspec.structs.replace(record, faults=(*faults, *record.faults))
-                faults = ()  # those of the expert's simulator are recorded once
+        with _keep_frames(self._tells_history) as seen:
+            history: list[FrameRef | None] = []
+            trajectory = units[0].trajectory.data
+
+            def replay(expert: Simulator) -> ExpertStates:
+                history.clear()
+                see = lambda view: history.append(seen.keep(view))  # noqa: E731
+                return replay_expert(trajectory, expert, see)
+
+            try:
+                with self._experts.one() as expert:
+                    states, faults = with_retries(expert, lambda: replay(expert), lambda: None)
+            except SceneError as error:
+                yield from (
+                    unit.record_exclusion(str(error), fingerprints[unit.key]) for unit in units
+                )
+                return
+            with arms.one() as simulator:
+                runner = ArmRunner(
+                    trajectory,
+                    states,
+                    simulator,
+                    self._create_actor(),
+                    senses=self._senses if self._sees else None,
+                    seed=self.seed,
+                    history=tuple(frame for frame in history if frame is not None),
+                )
+                for unit in units:
+                    run = partial(runner.run, self._tasks[unit.key.task], unit.episode)
+                    record = runner.record(unit, fingerprints[unit.key], run, session)
+                    yield msgspec.structs.replace(record, faults=(*faults, *record.faults))
+                    faults = ()  # those of the expert's simulator are recorded once
 
 
 def _arm_record(task: ManipulationTask, episode: ArmEpisode) -> ArmRecord:
@@ -174,6 +185,8 @@ def _arm_record(task: ManipulationTask, episode: ArmEpisode) -> ArmRecord:
         instruction=task.instruction(episode),
         max_reward=task.settings.reward,
         put_criterion=PutCriterion(task.settings.put_criterion),
+        pair="" if episode.choice is None else episode.choice.pair,
+        base="" if episode.choice is None else episode.choice.base,
     )
 
 
@@ -189,19 +202,21 @@ class ArmRunner(EpisodeRunner[ArmEnvironment, ArmRecord]):
         *,
         senses: Senses | None,
         seed: int,
+        history: tuple[FrameRef, ...] = (),
     ) -> None:
         """Take a trajectory, the states that its episodes begin in, and a simulator with an arm; no
-        senses if the actor looks at nothing."""
+        senses if the actor looks at nothing; and its frames, where episodes are about them."""
         super().__init__(simulator, lambda: ArmEnvironment(trajectory, simulator, senses))
         self._states = states
         self._actor = actor
+        self._history = history
         self._sees = senses is not None
         self._seed = f"{seed}/{trajectory.traj_id}"
 
     def run(self, task: ManipulationTask, episode: ArmEpisode) -> EpisodeResult[ArmRecord]:
         """Run an episode."""
         start = self._states.before(episode)
-        with self._frames() as frames:
+        with _keep_frames(self._sees) as frames:
             environment = self.environment
             outcome = environment.reset(
                 episode, start, task.settings.conversion, task.settings.grasp, frames
@@ -214,14 +229,19 @@ class ArmRunner(EpisodeRunner[ArmEnvironment, ArmRecord]):
                 start_distance=round(outcome.distance, _DIGITS),
             )
             seed = f"{self._seed}/{task.name}/{episode.index}"
-            told = Episode(seed, self.begun.instruction, task.settings.max_steps)
+            history = self._history if task.tells_history else ()
+            told = Episode(seed, self.begun.instruction, task.settings.max_steps, history)
             self._actor.begin(ArmSituation(environment, told, seed, task.settings.max_step))
             if isinstance(self._actor, PolicyActor) and outcome.observation is not None:
                 self.request = self._actor.request(outcome.observation)
             steps, ended = self._act(environment, outcome, task.settings.max_steps)
             closest = min([outcome.distance, *(step.distance for step in steps)])
             record = msgspec.structs.replace(
-                self.begun, steps=tuple(steps), closest=round(closest, _DIGITS), ended=str(ended)
+                self.begun,
+                steps=tuple(steps),
+                closest=round(closest, _DIGITS),
+                ended=str(ended),
+                nears_other=environment.nears_other(),
             )
             self._actor.end(success=record.done)
         reward = task.settings.reward if record.done else 0.0
@@ -249,14 +269,15 @@ class ArmRunner(EpisodeRunner[ArmEnvironment, ArmRecord]):
             steps.append(_arm_step(step, outcome))
         return steps, outcome.ended
 
-    @contextmanager
-    def _frames(self) -> Iterator[FrameKeeper]:
-        """Keep frames for the length of an episode."""
-        if not self._sees:
-            yield NoFrames()
-            return
-        with ScratchFolder() as folder:
-            yield FrameFolder(folder)
+
+@contextmanager
+def _keep_frames(are_kept: bool) -> Iterator[FrameKeeper]:
+    """Keep frames within the context, if at all."""
+    if not are_kept:
+        yield NoFrames()
+        return
+    with ScratchFolder() as folder:
+        yield FrameFolder(folder)
 
 
 def _arm_step(step: Step, outcome: ArmOutcome) -> ArmStep:

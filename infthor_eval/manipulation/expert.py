@@ -1,14 +1,12 @@
 """The true states in which episodes of an arm begin: before each pick-up and put of the expert."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from infthor_eval.episodes.records import InfeasibleError
-from infthor_eval.episodes.retries import with_retries
-from infthor_eval.episodes.simulators import Simulators
 from infthor_eval.formats.trajectory import LowAction, Trajectory
 from infthor_eval.manipulation.kinds import ManipulationKind
-from infthor_eval.manipulation.trajectories import EXPERT_ACTIONS, ArmEpisode
+from infthor_eval.manipulation.trajectories import EXPERT_ACTIONS, ArmEpisode, choice_episodes
 from infthor_eval.thor.grounding import Grounding
 from infthor_eval.thor.recorded import MissingObjectError, translate
 from infthor_eval.thor.restore import restore
@@ -54,12 +52,23 @@ class ExpertStates:
         return self.starts[episode.index]
 
 
-def replay_expert(trajectory: Trajectory, simulator: Simulator) -> ExpertStates:
-    """Replay the expert with AI2-THOR's default agent; keep states before pick-ups and puts.
+def replay_expert(
+    trajectory: Trajectory,
+    simulator: Simulator,
+    see: Callable[[SimulatorView], object] = lambda _: None,
+) -> ExpertStates:
+    """Replay the expert with AI2-THOR's default agent; keep states before pick-ups and puts, and at
+    the end for each choice between two things.
 
     A state is kept if the action succeeds.
+
+    Args:
+        trajectory: the trajectory.
+        simulator: a simulator of that agent.
+        see: called with the world at the start and after each action.
     """
     restore(simulator, trajectory.scene)
+    see(simulator.view)
     grounding = Grounding(simulator.view)
     starts: dict[int, EpisodeStart] = {}
     walked_from = simulator.view.agent
@@ -75,6 +84,7 @@ def replay_expert(trajectory: Trajectory, simulator: Simulator) -> ExpertStates:
         except MissingObjectError as error:
             return ExpertStates(starts, _refusal(number, low, str(error)))
         after = simulator.step(**call)
+        see(after)
         if not after.success:
             return ExpertStates(
                 starts, _refusal(number, low, after.error or "refused without a message")
@@ -86,16 +96,11 @@ def replay_expert(trajectory: Trajectory, simulator: Simulator) -> ExpertStates:
             starts[number] = EpisodeStart(
                 before, before.inventory[0], walked_from, call["objectId"]
             )
+    for episode in choice_episodes(trajectory):
+        assert episode.choice is not None
+        view = simulator.view
+        starts[episode.index] = EpisodeStart(view, episode.choice.target, view.agent)
     return ExpertStates(starts)
-
-
-def expert_states(
-    trajectory: Trajectory, experts: Simulators
-) -> tuple[ExpertStates, tuple[str, ...]]:
-    """Replay the expert in one of these simulators, again if that fails for good; return the
-    faults, too."""
-    with experts.one() as expert:
-        return with_retries(expert, lambda: replay_expert(trajectory, expert), lambda: None)
 
 
 def _refusal(number: int, low: LowAction, why: str) -> str:

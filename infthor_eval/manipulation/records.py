@@ -21,6 +21,7 @@ class ArmEnded(StrEnum):
 
     DONE = "done"
     ELSEWHERE = "released elsewhere"
+    OTHER = "took the other"
     GAVE_UP = "gave up"
     LIMIT = "step limit"
 
@@ -66,6 +67,10 @@ class ArmRecord(
         closest: smallest such distance.
         max_reward: reward of a success.
         put_criterion: when a put succeeds.
+        pair: name of the pair of choices between two things that it is of; empty for others.
+        base: what both worlds of the pair are made of; likewise.
+        nears_other: whether the hand had, or was nearer to, the other thing in the end and not the
+            one that is named; None for others.
     """
 
     instruction: str
@@ -77,6 +82,9 @@ class ArmRecord(
     closest: Amount = 0.0
     max_reward: Number = 0.0
     put_criterion: PutCriterion = PutCriterion.AT_REST
+    pair: str = ""
+    base: str = ""
+    nears_other: bool | None = None
 
     @property
     def done(self) -> bool:

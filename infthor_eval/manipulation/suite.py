@@ -7,6 +7,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import zip_longest
 from typing import ClassVar
 
+from msgspec import UNSET
+
 from infthor_eval.episodes.tables import NAME_COLUMNS, endings_table, named_tasks, result_notes
 from infthor_eval.formats.published import PUBLISHED_DATA, published_tables
 from infthor_eval.manipulation.actors import BASELINES
@@ -34,6 +36,11 @@ _FLOOR = (
     "Above still: percentage points more than the baseline that never moves, in the same episodes. "
     "With a sphere of 0.5 m it alone is above Table 6, so the paper's protocol differs from this "
     "one (docs/manipulation.md)."
+)
+_CHOICES = ("net pairs", "right", "exchanged", "chosen, net", "pairs", "incomplete")
+_CHOSEN = (
+    "Net pairs: the thing that is named taken in both worlds, less the other one in both; 0 on "
+    "average without memory. Chosen: by what the hand took, or else was nearer to in the end."
 )
 # Columns of the success table that the overview has: those before what was left out.
 _N_OVERVIEW = 6
@@ -71,14 +78,16 @@ class ManipulationSuite:
         )
 
     def primary_metrics(self, summary: ManipulationSummary) -> Mapping[str, Rate]:
-        """See `Suite.primary_metrics`: share of successful episodes."""
-        return {
-            name: task.success for name, task in summary.tasks.items() if task.success is not None
+        """See `Suite.primary_metrics`: net pairs of twins, else share of successful episodes."""
+        rates = {
+            name: task.success if task.choices is UNSET else task.choices.net_pairs
+            for name, task in summary.tasks.items()
         }
+        return {name: rate for name, rate in rates.items() if rate is not None}
 
     def overview(self, runs: Sequence[RunSummary]) -> list[Table]:
-        """See `Suite.overview`."""
-        return [_overview_table(runs)]
+        """See `Suite.overview`: success by kind, and arm twins."""
+        return [_overview_table(runs), *_choices_tables(list(named_tasks(runs)))]
 
     def tables(self, runs: Sequence[RunSummary]) -> list[Table]:
         """See `Suite.tables`."""
@@ -99,6 +108,7 @@ def _result_tables(runs: Sequence[RunSummary]) -> list[Table]:
     return [
         _success_table(runs),
         _episodes_table(tasks),
+        *_choices_tables(tasks),
         endings_table("How episodes ended", tasks),
     ]
 
@@ -190,6 +200,21 @@ def _episodes_table(tasks: Sequence[tuple[str, str, ArmTaskSummary]]) -> Table:
     names = ("in the sphere at the start, %", "closest, m", "steps", "collisions")
     columns = (*NAME_COLUMNS, Column("radius, m"), *map(Column, names))
     return Table("Episodes", columns, tuple(rows))
+
+
+def _choices_tables(tasks: Sequence[tuple[str, str, ArmTaskSummary]]) -> list[Table]:
+    """Return the table of arm twins; none without them."""
+    rows = []
+    for *names, task in tasks:
+        found = task.choices
+        if found is UNSET:
+            continue
+        shares = found.net_pairs, found.pair_accuracy, found.pairs_exchanged, found.chosen
+        counts = found.n_pairs, found.n_incomplete
+        rows.append(Row((*names, *map(format_percent, shares), *map(str, counts))))
+    columns = (*NAME_COLUMNS, *map(Column, _CHOICES))
+    table = Table("Arm twins: which of two things was taken", columns, tuple(rows), (_CHOSEN,))
+    return [table] if rows else []
 
 
 def _format_mean(value: float | None, digits: int = 1) -> str:

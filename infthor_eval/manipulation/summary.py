@@ -4,6 +4,8 @@ from collections.abc import Mapping, Sequence
 from statistics import fmean
 from types import MappingProxyType
 
+from msgspec import UNSET, UnsetType
+
 from infthor_eval.episodes.summary import (
     EpisodesSummary,
     EpisodeTaskSummary,
@@ -13,6 +15,7 @@ from infthor_eval.episodes.summary import (
     success_rate,
     summarise_episodes,
 )
+from infthor_eval.manipulation.choices import ChoiceResults, choice_results
 from infthor_eval.manipulation.config import ArmTaskConfig, ManipulationConfig
 from infthor_eval.manipulation.kinds import ManipulationKind
 from infthor_eval.manipulation.records import ArmEnded, ArmRecord
@@ -39,6 +42,7 @@ class ArmTaskSummary(EpisodeTaskSummary, frozen=True, kw_only=True):
         collisions: collisions of an episode, mean.
         outcomes: success of each episode with a result by its id, 1 or 0; ids begin with the
             trajectory. Runs are paired by them.
+        choices: results of arm twins; not written where there are none.
     """
 
     kind: str
@@ -51,6 +55,7 @@ class ArmTaskSummary(EpisodeTaskSummary, frozen=True, kw_only=True):
     steps: float | None
     collisions: float | None
     outcomes: dict[str, float]
+    choices: ChoiceResults | UnsetType = UNSET
 
     @property
     def n_episodes(self) -> int:
@@ -89,6 +94,7 @@ def _summarise_task(
         steps=_mean([len(record.payload.steps) for record in acted]),
         collisions=_mean([record.payload.n_collisions for record in acted]),
         outcomes={record.id: float(record.payload.done) for record in acted},
+        choices=choice_results(records),
     )
 
 

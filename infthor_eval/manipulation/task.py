@@ -1,6 +1,7 @@
 """A task of manipulation: the settings of its file, and its episodes."""
 
 import string
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any
 
@@ -50,6 +51,9 @@ class ArmTaskSettings:
     kind: Annotated[str, Setting(help='"pickup" or "put".', choices=tuple(ManipulationKind))] = (
         ManipulationKind.PICKUP
     )
+    twins: Annotated[
+        bool, Setting(help="Whether episodes are choices between two things, of arm twins.")
+    ] = False
     bundled: Annotated[
         str | None, Setting(help="Name of a set of trajectories in the package.")
     ] = None
@@ -164,16 +168,17 @@ class ManipulationTask(EpisodeTask[ArmTaskSettings, ArmTrajectory]):
             (trajectory, episode)
             for trajectory in self.trajectories.trajectories
             for episode in trajectory.episodes
-            if episode.kind == self.kind
+            if episode.kind == self.kind and (episode.choice is not None) == settings.twins
         ]
-        self.episodes = limit_items(
-            episodes, lambda pair: pair[0].traj_id, request.seed, request.limit
-        )
+        self.episodes = _limited(episodes, request)
         if not self.episodes:
-            raise UsageError(f"{self.name}: no trajectory there has a {KIND_NAMES[self.kind]}")
+            what = "choice between two things" if settings.twins else KIND_NAMES[self.kind]
+            raise UsageError(f"{self.name}: no trajectory there has a {what}")
 
     def instruction(self, episode: ArmEpisode) -> str:
         """Return the instruction of an episode."""
+        if episode.choice is not None:
+            return episode.choice.instruction
         template = self._template
         if template == "short":
             return KIND_NAMES[self.kind]
@@ -198,6 +203,11 @@ class ManipulationTask(EpisodeTask[ArmTaskSettings, ArmTrajectory]):
             state=self._options.state,
         )
 
+    @property
+    def tells_history(self) -> bool:
+        """Whether a policy is told what happened before."""
+        return self.settings.twins
+
     def _check_instruction(self, name: str) -> None:
         """Check that the instruction names the object, and all in braces can be filled in."""
         template = self._template
@@ -214,3 +224,20 @@ class ManipulationTask(EpisodeTask[ArmTaskSettings, ArmTrajectory]):
                 f"{' and may have {receptacle}' if len(known) > 1 else ''}, and nothing else in "
                 f'braces; or be "short" for {KIND_NAMES[self.kind]!r} alone'
             )
+
+
+def _limited(
+    episodes: Sequence[tuple[ArmTrajectory, ArmEpisode]], request: TaskRequest[ManipulationOptions]
+) -> list[tuple[ArmTrajectory, ArmEpisode]]:
+    """Return the episodes that a limit selects; both choices of a pair, which count as two."""
+    groups: dict[str, list[tuple[ArmTrajectory, ArmEpisode]]] = {}
+    for trajectory, episode in episodes:
+        alone = f"{trajectory.traj_id}/{episode.index}"
+        key = alone if episode.choice is None else episode.choice.pair
+        groups.setdefault(key, []).append((trajectory, episode))
+    of_pairs = any(episode.choice is not None for _, episode in episodes)
+    limit = request.limit and -(-request.limit // (1 + of_pairs))
+    chosen = limit_items(
+        list(groups.values()), lambda group: group[0][0].traj_id, request.seed, limit
+    )
+    return [episode for group in chosen for episode in group]

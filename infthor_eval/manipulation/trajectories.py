@@ -7,6 +7,7 @@ from infthor_eval.episodes.trajectory_sets import TaskTrajectory
 from infthor_eval.errors import DataError
 from infthor_eval.formats.object_ids import object_type_of
 from infthor_eval.formats.trajectory import LowAction, Trajectory, TrajectorySource
+from infthor_eval.formats.twins import ArmChoice
 from infthor_eval.manipulation.kinds import ManipulationKind
 from infthor_eval.storage.digests import digest
 
@@ -21,12 +22,14 @@ class ArmEpisode:
         index: index of the expert's low-level action.
         object_type: type of the object that is picked up or put.
         receptacle_type: type of the receptacle that it is put into; None for pick-ups.
+        choice: what an arm is told that stands before two things; None for the expert's actions.
     """
 
     index: int
     kind: ManipulationKind
     object_type: str
     receptacle_type: str | None = None
+    choice: ArmChoice | None = None
 
 
 @dataclass(frozen=True)
@@ -45,11 +48,20 @@ def arm_episodes(trajectory: Trajectory) -> list[ArmEpisode]:
     ]
 
 
+def choice_episodes(trajectory: Trajectory) -> list[ArmEpisode]:
+    """Return the choices between two things at a trajectory's end, numbered behind its actions."""
+    n_actions = len(trajectory.plan.low_actions)
+    return [
+        ArmEpisode(number, ManipulationKind.PICKUP, object_type_of(choice.target), choice=choice)
+        for number, choice in enumerate(trajectory.arm_choices, n_actions)
+    ]
+
+
 def read_arm_trajectory(source: TrajectorySource) -> ArmTrajectory:
     """Read a trajectory and its episodes; raises DataError if it cannot be used."""
     trajectory = source.read()
     try:
-        episodes = arm_episodes(trajectory)
+        episodes = [*arm_episodes(trajectory), *choice_episodes(trajectory)]
     except DataError as error:
         raise DataError(f"{source.place}: {error}") from error
     return ArmTrajectory(trajectory, digest(source.raw.strip()), episodes)

@@ -18,7 +18,7 @@ from infthor_eval.errors import DataError, SceneError, SimulatorError, UsageErro
 from infthor_eval.manipulation.conversion import Call
 from infthor_eval.manipulation.environment import ArmEnvironment, ArmOutcome, arm_of
 from infthor_eval.manipulation.evaluation import ArmUnit, Camera, ManipulationEvaluation
-from infthor_eval.manipulation.expert import expert_states
+from infthor_eval.manipulation.expert import replay_expert
 from infthor_eval.manipulation.options import ManipulationOptions
 from infthor_eval.manipulation.records import ArmEnded
 from infthor_eval.manipulation.senses import WRIST, hand_state
@@ -74,6 +74,8 @@ def arm_evaluation(
     place = Path(data) if data else None
     evaluation = ManipulationEvaluation(TaskRequest(files, options, place, limit))
     for checked in evaluation.tasks.values():
+        if checked.tells_history:
+            raise UsageError(f"{checked.name} is about frames before it, which no harness is told")
         for path, reason in checked.trajectories.broken:
             raise DataError(f"{path} cannot be used ({reason}); mend it or take it out")
     return evaluation
@@ -95,7 +97,7 @@ class ArmWorld:
         self.units = {f"{unit.key.task}/{unit.key.id}": unit for unit in ordered}
         self.settings = {name: task.settings for name, task in evaluation.tasks.items()}
         self._senses = evaluation.options.senses
-        self._experts = evaluation.expert_simulators()
+        self._experts = evaluation.simulators(image=False, instances=False)
         self._arms = evaluation.arm_simulators(image=True)
         self._lent = ExitStack()
         self._place: tuple[str, Camera] | None = None
@@ -164,7 +166,11 @@ class ArmWorld:
         if self._place == place:
             return
         self._leave()
-        self._states, _ = expert_states(unit.trajectory.data, self._experts)
+        trajectory = unit.trajectory.data
+        with self._experts.one() as expert:
+            self._states, _ = with_retries(
+                expert, lambda: replay_expert(trajectory, expert), lambda: None
+            )
         self._simulator = self._lent.enter_context(self._arms[self._settings.camera].one())
         self._place = place
 

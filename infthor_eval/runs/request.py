@@ -13,6 +13,7 @@ from infthor_eval.storage.once import forget_files
 from infthor_eval.workers import WorkerSettings
 from model_adapters import check_options, is_known, label, names
 
+IN_MEMORY = "(in memory)"  # name of a model that is an object, in place of one that is loaded
 _LONGEST_TASKS = 80  # characters of their names in a folder's
 
 

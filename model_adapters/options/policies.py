@@ -1,6 +1,7 @@
 """Options of policies in this process and behind a server; default checkpoints are in
 `built_in.py`."""
 
+import re
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -8,10 +9,20 @@ from msgspec import Meta
 
 from infthor_eval.quantities import Total
 from infthor_eval.settings import Setting
-from model_adapters.addresses import act_url
+from model_adapters.addresses import WEBSOCKET, act_url, server_address
 from model_adapters.options.checkpoints import CheckpointSource, ModelOptions, Placement
 
 DEFAULT_INTRINSICS = "default"
+# How servers code the gripper: the numbers for closed and for open.
+GRIPPERS = {
+    "binary_close_positive": (1.0, -1.0),
+    "binary_close_negative": (-1.0, 1.0),
+    "continuous_01": (0.0, 1.0),
+    "binary_close_01": (1.0, 0.0),
+}
+STATES = ("eef_pos3_euler3_gripper2", "eef_pos3_axisangle3_gripper2", "eef_pos3_quat4_gripper1")
+_Scale = Annotated[float, Meta(gt=0, le=100)]
+_PATH = re.compile(r"(/[\w.~-]+)+")
 _Execute = Annotated[
     Total | None, Setting(help="Steps of a chunk that are returned; default: all.", of="steps")
 ]
@@ -145,7 +156,22 @@ class SpatialVLACheckpointOptions(CheckpointSource, SpatialVLAOptions):
 
 
 @dataclass(frozen=True, kw_only=True)
-class VlaHttpOptions:
+class ServedPolicyOptions:
+    """Options of a policy behind a server, whatever it speaks."""
+
+    execute: _Execute = None
+    timeout_s: Annotated[
+        float, Meta(gt=0, le=86_400), Setting(help="Limit for a whole reply, in seconds.")
+    ] = 60.0
+    retries: Annotated[
+        int,
+        Meta(ge=0, le=10),
+        Setting(help="Repetitions of a request after a failed connection."),
+    ] = 3
+
+
+@dataclass(frozen=True, kw_only=True)
+class VlaHttpOptions(ServedPolicyOptions):
     """Options of a policy behind a server."""
 
     url: Annotated[str, Setting(help="Address of the server, without /act.")] = (
@@ -162,15 +188,76 @@ class VlaHttpOptions:
             choices=("json_numpy", "list"),
         ),
     ] = "json_numpy"
-    execute: _Execute = None
-    timeout_s: Annotated[
-        float, Meta(gt=0, le=86_400), Setting(help="Limit for a whole reply, in seconds.")
-    ] = 60.0
-    retries: Annotated[
-        int,
-        Meta(ge=0, le=10),
-        Setting(help="Repetitions of a request after a failed connection."),
-    ] = 3
+    reset: Annotated[
+        str | None,
+        Setting(
+            help="Path that each episode's instruction is posted to when it begins, such as "
+            "/reset; default: the server is told of none."
+        ),
+    ] = None
 
     def __post_init__(self) -> None:
         act_url(self.url)
+        if self.reset is not None and not _PATH.fullmatch(self.reset):
+            raise ValueError("reset is no path without a query; write /reset")
+
+
+@dataclass(frozen=True, kw_only=True)
+class SocketPolicyOptions(ServedPolicyOptions):
+    """Options of a policy behind a server of websockets, which are those of `vla-eval`."""
+
+    url: Annotated[str, Setting(help="Address of the server.")] = "ws://localhost:8000"
+    translation_scale: Annotated[
+        _Scale | None,
+        Setting(
+            help="What 1 of a movement is; default: 0.05 if declared from -1 to 1 or not at all, "
+            "else 1.",
+            of="metres",
+        ),
+    ] = None
+    rotation_scale: Annotated[
+        _Scale | None,
+        Setting(
+            help="What 1 of an angle is; default: 0.5 if declared from -1 to 1 or not at all, "
+            "else 1.",
+            of="radians",
+        ),
+    ] = None
+    gripper: Annotated[
+        str | None,
+        Setting(
+            help="Format of the gripper; default: as declared, else binary_close_positive.",
+            choices=tuple(GRIPPERS),
+        ),
+    ] = None
+    padded: Annotated[
+        bool, Setting(help="Steps have further numbers at their end, which mean nothing.")
+    ] = False
+    state_format: Annotated[
+        str | None,
+        Setting(
+            help=f"Format of the hand; default: as declared, else {STATES[0]}.", choices=STATES
+        ),
+    ] = None
+    deterministic: Annotated[
+        bool, Setting(help="Equal episodes get equal actions, which `check adapter` then requires.")
+    ] = False
+    max_in_flight: Annotated[
+        int, Meta(ge=1, le=64), Setting(help="Episodes at the same time, a connection each.")
+    ] = 1
+
+    def __post_init__(self) -> None:
+        server_address("url", self.url, WEBSOCKET)
+
+
+@dataclass(frozen=True, kw_only=True)
+class OpenPiOptions(SocketPolicyOptions):
+    """Options of `openpi`; keys and state are those of its models for LIBERO."""
+
+    image_key: Annotated[str, Setting(help="Key of the view.")] = "observation/image"
+    wrist_key: Annotated[str, Setting(help="Key of the view from the wrist.")] = (
+        "observation/wrist_image"
+    )
+    state_key: Annotated[str, Setting(help="Key of the hand's state.")] = "observation/state"
+    prompt_key: Annotated[str, Setting(help="Key of the instruction.")] = "prompt"
+    state_format: Annotated[str, Setting(help="Format of the hand.", choices=STATES)] = STATES[1]

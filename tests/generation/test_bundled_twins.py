@@ -21,6 +21,7 @@ from infthor_eval.generation.bundle import (
     digests_of,
     read_manifest,
 )
+from infthor_eval.generation.twins.drafting import draft_twins
 from infthor_eval.nieh.scoring import score
 from infthor_eval.storage.digests import digest_of_file
 from infthor_eval.storage.folders import packaged_folder
@@ -142,9 +143,9 @@ def test_twins_are_built_again_byte_for_byte(folder, pairs, tmp_path):
     the two that sets/README.md names, whose episodes are drawn otherwise today."""
     manifest = _manifest()
     part = msgspec.structs.replace(manifest, trajectories=manifest.trajectories[2:3])
-    strict = partial(score, scorer="strict")
-    built, numbers = build_twins(part, strict, tmp_path / "one", WorkerSettings())
-    again, _ = build_twins(part, strict, tmp_path / "other", WorkerSettings())
+    draft = partial(draft_twins, score=partial(score, scorer="strict"))
+    built, numbers = build_twins(part, draft, tmp_path / "one", WorkerSettings())
+    again, _ = build_twins(part, draft, tmp_path / "other", WorkerSettings())
     assert differing_files(built, again) == []
     assert numbers.trajectories == 1
     made = {pair.id: pair for pair in read_pairs(tmp_path / "one")}

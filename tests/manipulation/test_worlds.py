@@ -4,6 +4,7 @@ import pytest
 
 from infthor_eval.errors import DataError, SimulatorError, UsageError
 from infthor_eval.manipulation.environment import ArmEnvironment
+from infthor_eval.manipulation.task import ManipulationTask
 from infthor_eval.manipulation.worlds import ArmWorld, arm_evaluation
 from model_adapters import ArmDelta
 from tests.helpers.command_line import option_words
@@ -73,6 +74,12 @@ def test_a_world_that_lost_its_simulator_begins_again(task_file, open_world, mon
 def test_a_trajectory_that_cannot_be_used_is_named(data):
     (data / "broken.json").write_text("{}")
     with pytest.raises(DataError, match=r"broken.json cannot be used \(.*\); mend it or take"):
+        arm_evaluation(TASKS, str(data))
+
+
+def test_a_task_about_frames_before_it_is_refused(data, monkeypatch):
+    monkeypatch.setattr(ManipulationTask, "tells_history", True)
+    with pytest.raises(UsageError, match="manipulathor_pickup is about frames before it"):
         arm_evaluation(TASKS, str(data))
 
 

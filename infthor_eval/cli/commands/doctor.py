@@ -46,6 +46,7 @@ _EXTRAS = {
     ),
     "page": ("uvicorn", "pages that a command serves"),
     "ray": ("ray", "workers on a cluster (`--ray-address`)"),
+    "vla": ("websockets", "policies behind servers of websockets (`vla-eval`, `openpi`)"),
     "train": ("peft", "training with low-rank adapters (`train --recipe`)"),
 }
 _SHOWN = 5  # reasons that are named one by one

@@ -30,13 +30,12 @@ from infthor_eval.generation.simulator_jobs import (
     collect_outcomes,
     freeze_existing_objects,
 )
-from infthor_eval.generation.twins.drafting import Draft, TwinDraft, TwinSettings, draft_twins
+from infthor_eval.generation.twins.drafting import Draft, TwinDraft, TwinSettings
 from infthor_eval.generation.twins.final_tasks import (
     TRAJECTORIES,
     FinalTaskDraft,
     draft_final_tasks,
 )
-from infthor_eval.generation.twins.pairing import ScoreReply
 from infthor_eval.generation.twins.replays import MOST_MARKS
 from infthor_eval.storage.files import file_name, is_written, write_atomically
 from infthor_eval.thor.launch import Launch
@@ -49,6 +48,8 @@ _QUESTIONS = "qa_set_twins.csv"
 _DRAFTS = "drafts"  # folder in that of the set
 _HINT = "remove it, or choose another --out"
 
+# Makes the twins of a trajectory, given its hash, settings, and a simulator and the set's folder.
+DraftTwins = Callable[..., TwinDraft]
 _Item = tuple[TrajectorySource, Trajectory]
 _Draft = TypeVar("_Draft", TwinDraft, FinalTaskDraft)
 
@@ -144,7 +145,7 @@ def make_twins(
     launch: Launch,
     out: Path,
     settings: TwinSettings,
-    score: ScoreReply,
+    draft: DraftTwins,
     *,
     per_trajectory: int = 25,
     worker_settings: WorkerSettings,
@@ -158,7 +159,7 @@ def make_twins(
         launch: simulator that each worker starts.
         out: folder of the set; created if it does not exist.
         settings: how twins are made.
-        score: returns the strict score of a reply for gold answers; pickled for workers.
+        draft: makes the twins of a trajectory, such as `draft_twins`; pickled for workers.
         per_trajectory: most paired questions of one trajectory.
         worker_settings: number and place of the workers; they do not change the set.
         advance: called after each trajectory, with True if an earlier run made its draft.
@@ -168,7 +169,7 @@ def make_twins(
     for name in ("metadata", _DRAFTS):
         (out / name).mkdir(parents=True, exist_ok=True)
     claim_for_simulator(out, launch.label, launch.frames)
-    run_job = partial(_draft_one, out=out, settings=settings, score=score)
+    run_job = partial(_draft_one, out=out, settings=settings, draft=draft)
     start = partial(SimulatorWorker, partial(Simulator, launch, max_copies=MOST_MARKS), run_job)
     items = selection.items
 
@@ -188,10 +189,10 @@ def make_twins(
 
 
 def _draft_one(
-    item: _Item, simulator: Simulator, out: Path, settings: TwinSettings, score: ScoreReply
+    item: _Item, simulator: Simulator, out: Path, settings: TwinSettings, draft: DraftTwins
 ) -> _DraftOutcome[TwinDraft]:
     source, trajectory = item
-    make = partial(draft_twins, trajectory, source.digest, settings, score, simulator, out)
+    make = partial(draft, trajectory, source.digest, settings, simulator=simulator, out=out)
     return _draft_item(item, out, settings, TwinDraft, make)
 
 

@@ -7,23 +7,30 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
+from msgspec import UNSET
 from PIL import Image
 
 from infthor_eval.errors import UsageError
+from infthor_eval.manipulation.choices import score_choices
 from infthor_eval.manipulation.kinds import KIND_NAMES, ManipulationKind
 from infthor_eval.manipulation.recorded.curves import arm_curves
 from infthor_eval.manipulation.recorded.radii import Points, SuccessByRadius, success_by_radius
 from infthor_eval.manipulation.recorded.runs import ArmRun, label_by_radius
 from infthor_eval.manipulation.records import ArmRecord, ArmStep
+from infthor_eval.manipulation.summary import ManipulationSummary
+from infthor_eval.pairs import PAIR_BOUNDS
 from infthor_eval.rates import format_percent
 from infthor_eval.report.charts import Chart, Class, Panels, Series, point_of
 from infthor_eval.report.descriptions import Description, StepRow
 from infthor_eval.report.plain import PlainPresenter
 from infthor_eval.report.presenter import (
+    NET_PAIRS,
+    PAIRS_FINDING,
     EpisodeSelection,
     Figure,
     FigureRequest,
     FigureResult,
+    GroupScore,
     Recording,
 )
 from infthor_eval.report.recordings.arm_pictures import (
@@ -241,11 +248,25 @@ class ManipulationPresenter(PlainPresenter):
 
     def is_share(self, metric: str, scores: Sequence[float]) -> bool:
         """See `PlainPresenter.is_share`."""
-        return metric == self.main_metric
+        return metric == self.main_metric or metric in PAIR_BOUNDS
 
     def bounds(self, metric: str) -> tuple[float, float]:
         """See `PlainPresenter.bounds`: a reward has none."""
-        return (0.0, 1.0) if metric == self.main_metric else (-math.inf, math.inf)
+        return (-math.inf, math.inf) if metric == "reward" else PAIR_BOUNDS.get(metric, (0.0, 1.0))
+
+    def measure_of(self, task: str, summary: ManipulationSummary) -> str:
+        """See `PlainPresenter.measure_of`: of twins, pairs count."""
+        return self.measure if summary.tasks[task].choices is UNSET else NET_PAIRS
+
+    def finding_of(self, task: str, summary: ManipulationSummary) -> str:
+        """See `PlainPresenter.finding_of`."""
+        return self.finding if summary.tasks[task].choices is UNSET else PAIRS_FINDING
+
+    def group_scores(self, records: Sequence[Record]) -> Iterator[GroupScore]:
+        """See `PlainPresenter.group_scores`: net pairs of twins."""
+        for pair in score_choices(records):
+            for name, score in pair.shares.by_metric.items():
+                yield GroupScore(name, pair.pair, pair.cluster, score)
 
     def sections(self, runs: Sequence[Run]) -> Iterator[Section]:
         """See `PlainPresenter.sections`: reward along trajectories, and success by radius where

@@ -16,7 +16,7 @@ from infthor_eval.runs.journals.records import (
     UnitKey,
     UnitRecord,
 )
-from infthor_eval.runs.request import PreparedRun
+from infthor_eval.runs.request import IN_MEMORY, PreparedRun
 from infthor_eval.runs.suite import BoundEvaluation, Group, Need, Session, Suite, Workload
 from infthor_eval.storage.deadlines import limit_by
 from infthor_eval.storage.limits import OWN_CODE_SECONDS
@@ -141,11 +141,11 @@ def _header(
 ) -> RunHeader:
     """Return the header of a run's journal."""
     request = run.request
-    is_baseline = request.model in run.suite.baselines
+    is_own = request.model in run.suite.baselines or request.model == IN_MEMORY
     config = workload.config.complete(
         run.suite.name,
         {"name": subject.name, **identity_of(subject)},
-        adapter={} if is_baseline else adapter_identity(request.model),
+        adapter={} if is_own else adapter_identity(request.model),
         suite_code=request.suite_code,
         limit=request.tasks.limit,
         seed=request.tasks.seed,

@@ -38,7 +38,10 @@ class HttpPolicy:
         self.name = name
         self._options = options
         self._url = act_url(options.url)
-        self._client = _JsonClient(self._url, timeout_s=options.timeout_s, retries=options.retries)
+        self._client = _JsonClient(self._url, options)
+        base = self._url.removesuffix("/act")
+        self._resets = _JsonClient(base + options.reset, options) if options.reset else None
+        self._begins = False
 
     @property
     def capabilities(self) -> Capabilities:
@@ -54,13 +57,18 @@ class HttpPolicy:
             "unnorm_key": options.unnorm_key,
             "image": options.image,
             "execute": options.execute,
-        }
+        } | ({} if options.reset is None else {"reset": options.reset})
 
     def reset(self) -> None:
-        """Do nothing: the convention has no episodes."""
+        """Begin an episode: the server is told with the first frame, if it has an address for it;
+        the convention has none."""
+        self._begins = True
 
     def act(self, frame: FrameRef, instruction: str) -> tuple[ArmDelta, ...]:
         """Return the next steps; see `Policy.act`."""
+        if self._begins and self._resets is not None:
+            self._resets.send({"instruction": instruction})
+        self._begins = False
         pixels = np.asarray(frame.load())
         request: dict[str, Any] = {
             "image": pixels.tolist() if self._options.image == "list" else encode_array(pixels),
@@ -153,16 +161,15 @@ class _JsonClient:
     A whole reply may take `timeout_s` seconds; a failed connection is tried again `retries` times.
     """
 
-    def __init__(self, url: str, *, timeout_s: float, retries: int) -> None:
+    def __init__(self, url: str, options: VlaHttpOptions) -> None:
         self._url = url
-        self._timeout_s = timeout_s
-        self._retries = retries
+        self._timeout_s = options.timeout_s
+        self._retries = options.retries
         self._opener = urllib.request.build_opener(_NoRedirect)
 
     def post(self, content: object) -> Any:
         """Return the server's reply to a POST request, as JSON values."""
-        body = json.dumps(content).encode()
-        reply = self._send(body)
+        reply = self.send(content)
         try:
             return json.loads(reply)
         except (ValueError, RecursionError) as error:
@@ -170,6 +177,10 @@ class _JsonClient:
                 f"{self._url} answers with something that is not JSON: {_quote(reply)}; is it a "
                 "policy's address?"
             ) from error
+
+    def send(self, content: object) -> bytes:
+        """Return the server's reply to a POST request, whatever it is."""
+        return self._send(json.dumps(content).encode())
 
     def _send(self, body: bytes) -> bytes:
         # Only a failed connection is retried: an error status would come again, and a late reply

@@ -14,7 +14,7 @@ from infthor_eval.formats.twins import ComparedFrame, PairedQuestion, read_pairs
 from infthor_eval.generation.questions.history import TrajectoryHistory
 from infthor_eval.generation.replay_set import select
 from infthor_eval.generation.twins import rungs
-from infthor_eval.generation.twins.drafting import TwinSettings
+from infthor_eval.generation.twins.drafting import TwinSettings, draft_twins
 from infthor_eval.generation.twins.insertions import Insertion
 from infthor_eval.generation.twins.rungs import farthest_first, ladders, stretches, that_stay
 from infthor_eval.generation.twins.twin_set import make_twins
@@ -112,7 +112,7 @@ def made(file, tmp_path_factory):
         embedded_launch(),
         out,
         TwinSettings(kinds, rungs=RUNGS),
-        partial(score, scorer="strict"),
+        partial(draft_twins, score=partial(score, scorer="strict")),
         worker_settings=WorkerSettings(),
     )
     return out, summary

@@ -13,7 +13,7 @@ from infthor_eval.formats.step_log import read_steps
 from infthor_eval.formats.twins import read_pairs
 from infthor_eval.formats.undrawn import DIGESTS, WORLDS, drawn_folder, is_drawn, is_undrawn
 from infthor_eval.generation.replay_set import select
-from infthor_eval.generation.twins.drafting import TwinSettings
+from infthor_eval.generation.twins.drafting import TwinSettings, draft_twins
 from infthor_eval.generation.twins.twin_set import make_twins
 from infthor_eval.generation.twins.undrawn import draw_worlds, expected_digests, pack_worlds
 from infthor_eval.nieh import samples
@@ -34,7 +34,7 @@ def whole(file, tmp_path_factory):
         embedded_launch(),
         out,
         TwinSettings(("count-open", "put-target"), per_kind=1, rungs=(3, 6)),
-        partial(score, scorer="strict"),
+        partial(draft_twins, score=partial(score, scorer="strict")),
         worker_settings=WorkerSettings(),
     )
     return out

@@ -32,14 +32,14 @@ def no_proxy(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @contextmanager
-def serve(answer: Answer, path: str = "/act", port: int = 0) -> Iterator[str]:
-    """The address of a server that answers POSTs to a path, for as long as it is needed; at a port
-    that is free if none is given."""
+def serve(answer: Answer, path: str | None = "/act", port: int = 0) -> Iterator[str]:
+    """The address of a server that answers POSTs to a path (None: to any), for as long as it is
+    needed; at a port that is free if none is given."""
 
     class Handler(SilentHandler):
         def do_POST(self) -> None:
             body = self.rfile.read(int(self.headers["Content-Length"]))
-            if self.path != path:
+            if path not in (self.path, None):
                 self.send_error(404)
                 return
             content = answer(json.loads(body), self)

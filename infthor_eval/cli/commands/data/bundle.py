@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -83,12 +82,12 @@ def _build_twins(
     advance: Callable[[bool], None],
 ) -> tuple[TwinsManifest, tuple[str, str]]:
     """Build a set of twins; return what `_build_questions` does."""
+    from infthor_eval.cli.commands.data.questions import drafting_of
     from infthor_eval.generation.bundle import build_twins
-    from infthor_eval.nieh.scoring import score
+    from infthor_eval.thor.launch import embedded_launch
 
-    built, numbers = build_twins(
-        manifest, partial(score, scorer="strict"), out, worker_settings, advance
-    )
+    draft = drafting_of(manifest.twins, embedded_launch())
+    built, numbers = build_twins(manifest, draft, out, worker_settings, advance)
     content = (
         f"{numbers.pairs} paired questions of {numbers.found} on {numbers.facts} facts of "
         f"{numbers.trajectories} trajectories"

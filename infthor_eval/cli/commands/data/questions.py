@@ -30,7 +30,9 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from infthor_eval.formats.question import Question
-    from infthor_eval.generation.twins.twin_set import FinalTaskSummary, TwinSummary
+    from infthor_eval.generation.twins.drafting import TwinSettings
+    from infthor_eval.generation.twins.twin_set import DraftTwins, FinalTaskSummary, TwinSummary
+    from infthor_eval.thor.launch import Launch
 
 
 @example_command("questions", "infthor-eval questions SET --out SET/qa_set_mine.csv")
@@ -216,6 +218,11 @@ def _write(out: Path, questions: Sequence[Question], overwrite: bool) -> None:
     is_flag=True,
     help="Make twins for agents: trajectories with a final task, in place of questions.",
 )
+@click.option(
+    "--arms",
+    is_flag=True,
+    help="Make twins for arms: two things stand before it, and what happened tells which is meant.",
+)
 @floor_plans_option
 @worker_options
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as one JSON object.")
@@ -232,6 +239,7 @@ def twins(
     limit: int | None,
     unity: bool,
     final_tasks: bool,
+    arms: bool,
     data: Path | None,
     as_json: bool,
     **workers: Any,
@@ -241,20 +249,24 @@ def twins(
     A twin is the same episode in a world with one thing changed, so that a question in the same
     words has another answer. Writes an NIEH set with both worlds of each pair; trajectories that
     are done are not tried again. With --final-tasks, writes trajectories for the task
-    infthor_twins. Exit code 1 if twins of a trajectory cannot be made at all.
+    infthor_twins; with --arms, a set for manipulathor_twins and nieh_twins. Exit code 1 if twins of
+    a trajectory cannot be made at all.
     """
 
+    from infthor_eval.generation.arm_twins.drafting import KIND as ARM_KIND
     from infthor_eval.generation.replay_set import select
     from infthor_eval.generation.twins.drafting import TwinSettings
     from infthor_eval.generation.twins.twin_set import make_final_tasks, make_twins
-    from infthor_eval.nieh.scoring import score
     from infthor_eval.thor import launch
     from infthor_eval.thor.supplement import supplement_file
 
     worker_settings = parse_worker_settings(**workers)
     if rungs and final_tasks:
         raise UsageError("--rungs is for questions; leave it out, or --final-tasks")
-    settings = TwinSettings(parse_kinds(kinds, final_tasks), seed, per_kind, _parse_rungs(rungs))
+    if arms and (rungs or final_tasks or kinds or unity):
+        raise UsageError("--arms: leave out --rungs, --final-tasks, --kinds and --unity")
+    made = (ARM_KIND,) if arms else parse_kinds(kinds, final_tasks)
+    settings = TwinSettings(made, seed, per_kind, _parse_rungs(rungs))
     notes = error_console()
     with ExitStack() as held:
         held.enter_context(hold_folder(out))
@@ -263,14 +275,14 @@ def twins(
             supplement_file(trajectory for _, trajectory in selection.items)
         )
         progress = held.enter_context(progress_bar(notes))
+        launched = launch.unity_launch() if unity else launch.embedded_launch(data, supplement)
         make: Callable[..., TwinSummary | FinalTaskSummary] = make_final_tasks
         if not final_tasks:
-            make = partial(
-                make_twins, score=partial(score, scorer="strict"), per_trajectory=per_trajectory
-            )
+            draft = drafting_of(settings, launched)
+            make = partial(make_twins, draft=draft, per_trajectory=per_trajectory)
         summary = make(
             selection,
-            launch.unity_launch() if unity else launch.embedded_launch(data, supplement),
+            launched,
             out,
             settings,
             worker_settings=worker_settings,
@@ -286,6 +298,18 @@ def twins(
     for line in summary.failures:
         notes.print(f"no twins: {line}", style="red")
     context.exit(1 if summary.failures else 0)
+
+
+def drafting_of(settings: TwinSettings, launched: Launch) -> DraftTwins:
+    """Return what makes twins of a trajectory by these settings, in this simulator."""
+    from infthor_eval.generation.arm_twins.drafting import KIND, draft_arm_twins
+    from infthor_eval.generation.twins.drafting import draft_twins
+    from infthor_eval.manipulation.reach import PlannerReach
+    from infthor_eval.nieh.scoring import score
+
+    if settings.kinds == (KIND,):
+        return partial(draft_arm_twins, reaches=PlannerReach(launched))
+    return partial(draft_twins, score=partial(score, scorer="strict"))
 
 
 def parse_kinds(names: str | None, final_tasks: bool = False) -> tuple[str, ...]:

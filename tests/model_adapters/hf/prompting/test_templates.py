@@ -22,7 +22,8 @@ from ...checkpoints import FAMILIES, OTHERS
 
 NEW = 6
 # Nobody converses with these.
-POLICIES = {"openvla", "openvla@vllm", "openvla-tiny", "spatialvla", "spatialvla-tiny", "vla-http"}
+POLICIES = {"openvla", "openvla@vllm", "openvla-tiny", "spatialvla", "spatialvla-tiny"}
+POLICIES |= {"openpi", "vla-eval", "vla-http"}
 IMAGES = {
     "qwen2.5-vl": "<|vision_start|><|image_pad|><|vision_end|>",
     "llava-onevision": "<image>",

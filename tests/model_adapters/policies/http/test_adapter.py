@@ -12,7 +12,7 @@ import pytest
 
 from infthor_eval.errors import DataError, ModelError, UsageError
 from infthor_eval.formats.frames import FrameRef
-from model_adapters import check_adapter, load
+from model_adapters import ArmObservation, Episode, check_adapter, load, with_episodes
 from model_adapters.policies.http import adapter
 from model_adapters.policies.http.adapter import decode_numbers, encode_array
 
@@ -61,6 +61,55 @@ def test_a_frame_and_an_instruction_are_sent_and_an_action_comes_back(image, end
     assert (request["instruction"], request["unnorm_key"]) == ("pick up the mug", "bridge_orig")
     seen = read_image(request)
     assert (seen.shape, seen.dtype, np.unique(seen).tolist()) == ((300, 300, 3), np.uint8, [255])
+
+
+class _Rooms:
+    """A server of episodes: `/act` answers with the frames since the last `/reset`."""
+
+    def __init__(self, *, has_reset=True):
+        self.instructions, self.n_frames = [], 0
+        self._has_reset = has_reset
+
+    def __call__(self, request, handler):
+        if handler.path == "/reset" and self._has_reset:
+            self.n_frames = 0
+            self.instructions.append(request["instruction"])
+            send(handler, 200, b"")  # whatever it answers is no matter
+        elif handler.path == "/act":
+            self.n_frames += 1
+            return [self.n_frames / 100, *ACTION[1:]]
+        else:
+            handler.send_error(404)
+        return None
+
+
+def _episodes(url, frames, **settings):
+    """First numbers of the steps of two episodes, each of all frames."""
+    policy = with_episodes(load("vla-http", {"url": url, **settings}, 0))
+    firsts = []
+    for instruction in ("pick up the mug", "put it down"):
+        policy.begin(Episode("e", instruction, len(frames)))
+        firsts += [policy.act(ArmObservation(frame))[0].translation[0] for frame in frames]
+        policy.end(success=False)
+    return firsts
+
+
+def test_a_server_is_told_of_episodes_if_it_has_an_address_for_it(plain_frames):
+    rooms = _Rooms()
+    with serve(rooms, path=None) as url:
+        assert _episodes(f"{url}/act", plain_frames, reset="/reset") == [0.01, 0.02, 0.01, 0.02]
+        assert rooms.instructions == ["pick up the mug", "put it down"]
+        assert _episodes(url, plain_frames) == [0.03, 0.04, 0.05, 0.06]  # of its own accord: none
+    policy = load("vla-http", {"url": "http://host/base/", "reset": "/new/start"}, 0)
+    assert policy.identity()["reset"] == "/new/start"
+
+
+def test_a_server_without_that_address_is_one_line(plain_frames):
+    rooms = _Rooms(has_reset=False)
+    with serve(rooms, path=None) as url, pytest.raises(ModelError) as caught:
+        _episodes(url, plain_frames, reset="/reset")
+    assert f"{url}/reset answers 404 Not Found" in str(caught.value)
+    assert "\n" not in str(caught.value)
 
 
 def test_without_a_key_none_is_sent(plain_frames):
@@ -228,6 +277,8 @@ def test_a_frame_that_is_not_there_is_a_fault_of_the_data(plain_frames):
         ({"timeout_s": "0"}, "timeout_s=0: give a number above 0"),
         ({"retries": "11"}, "retries=11: give a whole number from 0, at most 10"),
         ({"execute": "0"}, "execute=0"),
+        ({"reset": "reset"}, "reset is no path without a query; write /reset"),
+        ({"reset": "/reset?token=secret"}, "is no path"),
     ],
 )
 def test_misuse_is_refused_and_no_secret_told(settings, message):
