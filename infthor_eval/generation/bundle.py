@@ -30,6 +30,7 @@ from infthor_eval.formats.reading import read_json
 from infthor_eval.formats.shared_frames import store_picture, write_frame_names
 from infthor_eval.formats.step_log import LOG
 from infthor_eval.formats.twins import ComparedFrame, TwinPair, read_pairs, write_pairs
+from infthor_eval.generation.arm_twins.drafting import KIND as ARM_KIND
 from infthor_eval.generation.compact.pictures import encode, encode_alike, reduce_colors
 from infthor_eval.generation.generate_set import generate_set
 from infthor_eval.generation.questions.generate import GeneratedQuestions, generate_questions
@@ -53,6 +54,7 @@ _TRAJECTORIES = "trajectories"
 _REPLAYED = "replayed"
 _WHOLE = "whole"
 _SET = "set"
+_TRAJECTORY = "traj_data.json"
 _PACKED = PackSettings(level=19)
 # All frames of a base are compressed together: its worlds differ little.
 _PACKED_TWINS = PackSettings(frames_per_group=2_000, level=19)
@@ -285,7 +287,8 @@ def digests_of(root: Path) -> dict[str, str]:
 def copy_compactly(source: Path, out: Path, colors: int) -> None:
     """Copy the worlds that questions are asked in: their logs, packed, and pictures.
 
-    Left out are drafts, trajectories (`traj_data.json`), and actions and states in words.
+    Left out are drafts, trajectories (`traj_data.json`) but those of arms, which act at their end,
+    and actions and states in words.
 
     Args:
         source: a set of twins.
@@ -317,7 +320,8 @@ def _copy_worlds(
         folder.mkdir(parents=True)
         stored = [store_picture(out, pictures[frame], name) for frame in frames]
         write_frame_names(folder, stored)
-        (folder / LOG).write_bytes((data.folder(name) / LOG).read_bytes())
+        for file in (LOG, _TRAJECTORY) if pairs[0].kind == ARM_KIND else (LOG,):
+            (folder / file).write_bytes((data.folder(name) / file).read_bytes())
         yield name, stored
 
 

@@ -203,7 +203,7 @@ class _Maker:
         one, other = (_SIDES[thing != left] for thing in asked.things)
         name = asked.form
         return PairedQuestion(
-            text=f'Two things are before you. Which one is meant by "{asked.instruction}": the '
+            text=f'You put two things down here. Which one is meant by "{asked.instruction}": the '
             "left or the right one?",
             form=f"arm {name}",
             question_type=f"arm {name}",

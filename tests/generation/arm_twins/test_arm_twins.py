@@ -1,13 +1,13 @@
 """Arm twins: what they are, and what an arm makes of them that knows, guesses, or remembers."""
 
-import random
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import msgspec
 import pytest
 
-from infthor_eval import Evaluator, load_run
+from infthor_eval import Evaluator, evaluate, load_run
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.trajectory import encode_trajectory, iter_trajectories
@@ -15,6 +15,7 @@ from infthor_eval.formats.twins import read_pairs
 from infthor_eval.manipulation import actors
 from infthor_eval.manipulation.actors import PlannerArm, _PlannerActor
 from infthor_eval.manipulation.trajectories import choice_episodes
+from infthor_eval.run import open_runs
 from model_adapters import Capabilities
 
 from ...helpers.command_line import read_success
@@ -81,15 +82,30 @@ def test_what_is_named_is_what_the_log_says(worlds):
 
 @pytest.fixture
 def run(folder, tmp_path):
-    """Evaluates an object on the set; returns its net pairs and the records as a table."""
+    """Evaluates a model by name, or an object, on the set; returns what the run holds."""
 
-    def run(policy, **options):
-        with Evaluator(TASK, data=str(folder), out=str(tmp_path), **options) as evaluator:
-            scores = evaluator(policy)
-            (outcome,) = evaluator.outcomes(policy, name="again")
-        return scores[TASK], [record.payload for record in outcome.records], outcome
+    def run(model, **options):
+        frame = evaluate(model, TASK, data=str(folder), out=str(tmp_path), **options)
+        (opened,) = open_runs([Path(frame.folder[0])])
+        return opened
 
     return run
+
+
+@pytest.fixture
+def cheat(run, monkeypatch):
+    """Runs the planner, which goes to the other thing where a rule says; returns net pairs by what
+    it took and by what it chose, and how episodes ended."""
+
+    def cheat(rule):
+        monkeypatch.setattr(_Cheating, "rule", staticmethod(rule), raising=False)
+        monkeypatch.setattr(PlannerArm, "_actor", _Cheating)
+        opened = run("planner-arm")
+        found = opened.summary.summary.tasks[TASK].choices
+        ended = [record.payload.ended for record in opened.records]
+        return found.net_pairs.mean, found.chosen.mean, ended
+
+    return cheat
 
 
 class _Cheating(_PlannerActor):
@@ -105,30 +121,15 @@ class _Cheating(_PlannerActor):
         super().begin(situation)
 
 
-@pytest.mark.parametrize(
-    ("rule", "net"),
-    [
-        (lambda situation: False, 1.0),
-        (lambda situation: True, -1.0),
-        # By the instruction alone, which is the same in both worlds.
-        (lambda situation: random.Random(situation.episode.instruction).random() < 0.5, None),
-    ],
-    ids=["key", "exchanged", "coin"],
-)
-def test_a_planner_has_what_its_knowledge_is_worth(run, monkeypatch, rule, net):
-    monkeypatch.setattr(_Cheating, "rule", staticmethod(rule), raising=False)
-    arm = type("Arm", (PlannerArm,), {"_actor": _Cheating})()
-    score, payloads, outcome = run(arm)
-    if net is not None:
-        assert score == net
-        ended = "done" if net > 0 else "took the other"
-        assert {payload.ended for payload in payloads} == {ended}
-        assert {payload.nears_other for payload in payloads} == {net < 0}
-    chosen = outcome.summary.summary.tasks[TASK].choices.chosen.mean
-    assert chosen == score
+def test_a_planner_has_what_its_knowledge_is_worth(cheat):
+    assert cheat(lambda situation: False) == (1.0, 1.0, ["done"] * 4)
 
 
-def test_by_the_side_alone_there_are_no_net_pairs(run, worlds, monkeypatch):
+def test_who_has_it_the_wrong_way_round_is_below_zero(cheat):
+    assert cheat(lambda situation: True) == (-1.0, -1.0, ["took the other"] * 4)
+
+
+def test_by_the_side_alone_there_are_no_net_pairs(cheat, worlds):
     """Who always goes left takes the same thing in both worlds."""
     pair, trajectories = worlds
     left = {}
@@ -140,10 +141,9 @@ def test_by_the_side_alone_there_are_no_net_pairs(run, worlds, monkeypatch):
         _, name, _, index = situation.seed.split("/")
         return not left[name, int(index)]
 
-    monkeypatch.setattr(_Cheating, "rule", staticmethod(goes_right), raising=False)
-    score, payloads, _ = run(type("Arm", (PlannerArm,), {"_actor": _Cheating})())
-    assert score == 0.0
-    assert sorted(payload.ended for payload in payloads) == ["done"] * 2 + ["took the other"] * 2
+    net, chosen, ended = cheat(goes_right)
+    assert (net, chosen) == (0.0, 0.0)
+    assert sorted(ended) == ["done"] * 2 + ["took the other"] * 2
 
 
 class Watching:
@@ -177,9 +177,9 @@ def test_a_policy_is_shown_what_happened_and_the_same_present(run, folder, world
     monkeypatch.setattr(actors, "check_chunk", lambda *_: None)
     pair, _ = worlds
     policy = Watching()
-    score, payloads, _ = run(policy)
-    assert score == 0.0
-    assert {payload.ended for payload in payloads} == {"gave up"}
+    opened = run(policy)
+    assert opened.summary.summary.tasks[TASK].choices.net_pairs.mean == 0.0
+    assert {record.payload.ended for record in opened.records} == {"gave up"}
     frames = {name: [f.digest for f in NiehSet(folder).frames(name)] for name in pair.traj_ids}
     for name, instruction, history, *present in policy.told:
         _, world, _, _ = name.split("/")
@@ -206,9 +206,9 @@ def test_which_one_is_asked_in_words_too(folder, tmp_path, run_cli):
 
 
 def test_a_limit_keeps_both_worlds_of_a_pair(run):
-    _, payloads, _ = run(PlannerArm(), limit=2)
-    assert len(payloads) == 2
-    assert len({payload.pair for payload in payloads}) == 1
+    records = run("planner-arm", limit=2).records
+    assert len(records) == 2
+    assert len({record.payload.pair for record in records}) == 1
 
 
 def test_trajectories_without_choices_and_options_of_other_twins_are_refused(tmp_path):
