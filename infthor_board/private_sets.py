@@ -26,7 +26,7 @@ from infthor_eval.formats.shared_frames import store_picture, write_frame_names
 from infthor_eval.generation.generate_set import generate_with_workers
 from infthor_eval.generation.replay_set import select
 from infthor_eval.generation.settings import TrajectorySettings
-from infthor_eval.generation.twins.drafting import TwinSettings
+from infthor_eval.generation.twins.drafting import TwinSettings, draft_twins
 from infthor_eval.generation.twins.twin_set import make_twins
 from infthor_eval.nieh.scoring import score
 from infthor_eval.storage.files import prepare_folder
@@ -133,7 +133,7 @@ def make_private_set(
         embedded_launch(),
         key,
         TwinSettings(kinds, secret.seed("twins")),
-        partial(score, scorer="strict"),
+        partial(draft_twins, score=partial(score, scorer="strict")),
         per_trajectory=per_trajectory,
         worker_settings=worker_settings,
         advance=lambda resumed: advance("twins", resumed),

@@ -146,6 +146,6 @@ def __getattr__(name: str) -> Any:
     """Return `Evaluator`, which is imported when it is asked for."""
     if name != "Evaluator":
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from infthor_eval.cli.evaluation import Evaluator
+    from infthor_eval.plugins import import_target
 
-    return Evaluator
+    return import_target("infthor_eval.cli.evaluation:Evaluator")

@@ -11,7 +11,7 @@ from infthor_eval.generation.generate_set import generate_with_workers
 from infthor_eval.generation.jobs import trajectory_jobs
 from infthor_eval.generation.questions.generate import generate_questions
 from infthor_eval.generation.replay_set import replay_with_workers, select
-from infthor_eval.generation.twins.drafting import TwinSettings
+from infthor_eval.generation.twins.drafting import TwinSettings, draft_twins
 from infthor_eval.generation.twins.kinds import KINDS
 from infthor_eval.generation.twins.twin_set import make_twins
 from infthor_eval.nieh.scoring import score
@@ -146,7 +146,7 @@ def _make_twins(
             embedded_launch(),
             twin_set,
             TwinSettings(KINDS.names, seed, scenes.twins_per_edit),
-            partial(score, scorer="strict"),
+            partial(draft_twins, score=partial(score, scorer="strict")),
             per_trajectory=_EVERY,
             worker_settings=worker_settings,
             advance=PacedBar(progress, "twins", len(selection.items)).advance,

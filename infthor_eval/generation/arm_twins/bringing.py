@@ -206,20 +206,15 @@ def _stands(
     """Yield pairs of poses from which the surface is seen, side by side, in random order."""
     restore(simulator, scene)
     grid = reachable_grid(simulator)
+    standing = (
+        GridPose(cell, facing) for cell in sorted(grid.cells) for facing in (0, 90, 180, 270)
+    )
     poses = [
         Viewpoint(pose, _HORIZON)
-        for cell in sorted(grid.cells)
-        for pose in (GridPose(cell, facing) for facing in (0, 90, 180, 270))
-        if _faces(grid.position(cell), pose.facing, errand.surface)
+        for pose in standing
+        if _faces(grid.position(pose.cell), pose.facing, errand.surface)
     ]
-    pairs = [
-        pair
-        for pair in permutations(poses, 2)
-        if pair[0].pose.facing == pair[1].pose.facing
-        and _BETWEEN_STANDS[0]
-        <= math.dist(*(grid.position(one.pose.cell) for one in pair))
-        <= _BETWEEN_STANDS[1]
-    ]
+    pairs = [pair for pair in permutations(poses, 2) if _side_by_side(grid, *pair)]
     rng.shuffle(pairs)
     n_found = 0
     for pair in pairs[: 4 * _MOST_TRIALS]:
@@ -231,18 +226,26 @@ def _stands(
             yield pair
 
 
+def _side_by_side(grid: Grid, one: Viewpoint, other: Viewpoint) -> bool:
+    least, most = _BETWEEN_STANDS
+    apart = math.dist(grid.position(one.pose.cell), grid.position(other.pose.cell))
+    return one.pose.facing == other.pose.facing and least <= apart <= most
+
+
+def _beside(at: float, middle: float, width: float) -> float:
+    """Return how far it is along an axis from a place to what is so wide; 0 within."""
+    low, high = middle - width / 2, middle + width / 2
+    return max(low - at, 0.0) + min(high - at, 0.0)
+
+
 def _faces(position: tuple[float, float], facing: int, surface: ThorObject) -> bool:
     """Return True if an agent there is near a surface and looks at it."""
     box = surface.axis_aligned_bounding_box
     assert box is not None  # a surface of the simulator has one
-    middle, half = (box.center.x, box.center.z), (box.size.x / 2, box.size.z / 2)
-    away = [
-        max(low - at, 0.0) + min(high - at, 0.0)
-        for at, low, high in (
-            (at, mid - side, mid + side)
-            for at, mid, side in zip(position, middle, half, strict=True)
-        )
-    ]
+    away = (
+        _beside(position[0], box.center.x, box.size.x),
+        _beside(position[1], box.center.z, box.size.z),
+    )
     ahead = math.sin(math.radians(facing)), math.cos(math.radians(facing))
     distance = math.hypot(*away)
     along = away[0] * ahead[0] + away[1] * ahead[1]
@@ -316,20 +319,27 @@ def _seen_from(
 
 def _check_alike(here: Brought, there: Brought) -> None:
     """Raise EditRefused unless both worlds end alike."""
-    one, other = (
-        {
-            obj.name: replace(obj, object_id="", distance=0.0, parent_receptacles=None,
-                              receptacle_object_ids=None, visible=False)
-            for obj in world.view.objects.values()
-        }
-        for world in (here, there)
-    )  # fmt: skip
     if here.view.agent != there.view.agent:
         raise EditRefused("the agent ends elsewhere")
-    if one != other:
+    if _states(here.view) != _states(there.view):
         raise EditRefused("the things end elsewhere")
     if here.tail != there.tail:
         raise EditRefused("the ways back differ")
+
+
+def _states(view: SimulatorView) -> dict[str, ThorObject]:
+    """Return what there is by name, but for ids and what depends on the agent."""
+    return {
+        obj.name: replace(
+            obj,
+            object_id="",
+            distance=0.0,
+            visible=False,
+            parent_receptacles=None,
+            receptacle_object_ids=None,
+        )
+        for obj in view.objects.values()
+    }
 
 
 def _horizon(simulator: Simulator) -> int:
