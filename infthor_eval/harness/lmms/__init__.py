@@ -1,0 +1,7 @@
+"""Pairs of questions as tasks of lmms-eval: task files for its `--include_path`, and their
+functions."""
+
+from pathlib import Path
+
+PATH = Path(__file__).parent
+"""Folder of the task files."""
