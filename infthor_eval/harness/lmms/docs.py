@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from PIL import Image
 
 from infthor_eval.errors import DataError, UsageError
+from infthor_eval.formats.frames import as_shown
 from infthor_eval.formats.packed.tables import HINT, LocalStore, Shards
 from infthor_eval.formats.question import WITHHELD, Question
 from infthor_eval.nieh.contexts import DEFAULT_CONTEXT, context_named
@@ -111,7 +112,7 @@ def _check(questions: "Dataset", rows: Sequence[Doc], asked: Sequence[int]) -> N
 def doc_to_visual(doc: Doc) -> list[Image.Image]:
     """Return the clue frames in time order, as the context `clues` shows them."""
     numbered = zip(doc["gt_img_idx"], doc["clue_frames"], strict=True)
-    return [frame.convert("RGB") for _, frame in sorted(numbered, key=itemgetter(0))]
+    return [as_shown(frame) for _, frame in sorted(numbered, key=itemgetter(0))]
 
 
 def doc_to_text(doc: Doc) -> str:
@@ -125,6 +126,4 @@ def doc_to_target(doc: Doc) -> str:
 
 
 def _question(doc: Doc) -> Question:
-    return Question(
-        doc["traj_id"], doc["question"], tuple(doc["gt_img_idx"]), tuple(doc["answer"])
-    )
+    return Question(doc["traj_id"], doc["question"], tuple(doc["gt_img_idx"]), tuple(doc["answer"]))
