@@ -15,6 +15,8 @@ INSPECT := $(VENV)/inspect-ai
 # vla-eval's own servers answer its client; a folder apart, as twenty other packages come with it, and others take
 # websockets where they see it.
 VLA_EVAL := $(VENV)/vla-eval
+# lmms-eval runs our task files in one slow test; a folder apart, as sixty other packages would come with it.
+LMMS_EVAL := $(VENV)/lmms-eval
 # The renderer is compiled once; otherwise each process that finds it missing would compile it.
 COMPILED := $(VENV)/.compiled
 
@@ -63,11 +65,11 @@ test: $(COMPILED) $(PEERS) $(INSPECT) $(VLA_EVAL)
 
 # The slow ones too; 2.3 hours of one core, so more than an hour on two. TESTS: some of them.
 TESTS ?= tests
-test-all: $(COMPILED) $(PEERS) $(INSPECT) $(VLA_EVAL)
+test-all: $(COMPILED) $(PEERS) $(INSPECT) $(VLA_EVAL) $(LMMS_EVAL)
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 3 --dist loadfile --no-loadscope-reorder $(TESTS)
 
 # Measures all tests, and lists those that are slow in tests/slow_tests.txt.
-test-times: $(COMPILED) $(PEERS) $(INSPECT) $(VLA_EVAL)
+test-times: $(COMPILED) $(PEERS) $(INSPECT) $(VLA_EVAL) $(LMMS_EVAL)
 	rm -rf build/processor_times
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder -p tests.processor_times
 	$(BIN)/python -m tests.processor_times
@@ -158,6 +160,10 @@ $(PEERS): $(DEVELOPED)
 
 $(VLA_EVAL): $(DEVELOPED)
 	$(BIN)/$(PIP) -c constraints.txt --no-deps --upgrade --target $@ vla-eval websockets lazyregistry
+	touch $@
+
+$(LMMS_EVAL): $(DEVELOPED)
+	$(BIN)/$(PIP) -c constraints.txt --no-deps --upgrade --target $@ 'lmms-eval==0.7.3' loguru tenacity python-dotenv jsonlines
 	touch $@
 
 $(INSPECT):

@@ -25,6 +25,7 @@ PARSED_PAGES = {
     "CONTRIBUTING.md": CLONE,
     "docs/engines.md": GPU,
     "docs/figures.md": HOURS,
+    "docs/howto/lmms-eval.md": READERS,
     "docs/howto/own-scenes.md": HOURS,
     "docs/howto/publish-a-set.md": READERS,
     "docs/howto/trackers.md": "needs an account of a tracker",

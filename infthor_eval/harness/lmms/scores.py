@@ -19,12 +19,11 @@ Side = Mapping[str, Any]  # of a pair: a question's reply
 def process_results(doc: Doc, results: Sequence[str]) -> dict[str, Any]:
     """Return both scores of a reply, and what the metrics of pairs need of it."""
     reply, answers, others = results[0], doc["answer"], doc[OTHER]
-    found: dict[str, Any] = dict(scores(reply, answers))
-    if answers == others:
-        return found
+    found = scores(reply, answers)
     side = {
         "pair": doc["pair"],
         "side": doc["id"],
+        "placebo": answers == others,
         "right": found["strict"] >= 1,
         "exchanged": score(reply, others, "strict") >= 1,
     }
@@ -49,7 +48,7 @@ def pairs_exchanged(sides: Sequence[Side]) -> float:
 def _mean(sides: Sequence[Side], metric: str) -> float:
     """Return the mean of whole pairs: several processes hand their replies over in turns."""
     pairs: dict[str, dict[str, Side]] = {}
-    for side in sides:
+    for side in (side for side in sides if not side["placebo"]):
         pairs.setdefault(side["pair"], {})[side["side"]] = side
     whole = [list(both.values()) for both in pairs.values() if len(both) == 2]
     if len(whole) < len(pairs):
