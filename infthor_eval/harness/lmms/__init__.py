@@ -1,5 +1,4 @@
-"""Pairs of questions as tasks of lmms-eval: task files for its `--include_path`, and their
-functions."""
+"""Pairs of questions for lmms-eval: task files for its `--include_path`, and their functions."""
 
 from pathlib import Path
 

@@ -52,12 +52,8 @@ def _mean(sides: Sequence[Side], metric: str) -> float:
         pairs.setdefault(side["pair"], {})[side["side"]] = side
     whole = [list(both.values()) for both in pairs.values() if len(both) == 2]
     if len(whole) < len(pairs):
-        logging.getLogger(__name__).warning(
-            "%s: %d of %d pairs lack a reply and are left out; give --limit an even number",
-            metric,
-            len(pairs) - len(whole),
-            len(pairs),
-        )
+        lost = f"{len(pairs) - len(whole)} of {len(pairs)} pairs lack a reply and are left out"
+        logging.getLogger(__name__).warning("%s: %s; give --limit an even number", metric, lost)
     return PairShares.mean(map(_shares, whole)).by_metric[metric] if whole else nan
 
 
