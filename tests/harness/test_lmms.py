@@ -253,7 +253,7 @@ def test_a_folder_that_is_no_packed_set_is_named(load, tmp_path):
 
 def test_moments_need_a_set(load, monkeypatch):
     monkeypatch.delenv("INFTHOR_SET", raising=False)
-    with pytest.raises(SystemExit, match="no set of moments comes with the package"):
+    with pytest.raises(SystemExit, match="no set of moments is in the package"):
         load(MOMENTS)
     with pytest.raises(AttributeError, match="no attribute 'FILES'"):
         _ = docs.FILES

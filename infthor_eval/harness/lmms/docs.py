@@ -38,7 +38,7 @@ def __getattr__(name: str) -> dict[str, list[str]]:
     with _ending_in_one_line():
         given = os.environ.get(_SET)
         if not given and name == "MOMENT_FILES":
-            raise UsageError(f"no set of moments comes with the package; set {_SET} to one")
+            raise UsageError(f"no set of moments is in the package; set {_SET} to a packed one")
         return _files(Path(given) if given else packaged_folder("sets/nieh_mini_twins"))
 
 
