@@ -16,6 +16,8 @@ INSPECT := $(VENV)/inspect-ai
 # other packages come with them, and others take websockets where they see it.
 VLA_EVAL := $(VENV)/vla-eval
 ROBOTS := $(VENV)/inspect-robots
+# lmms-eval runs our task files in one slow test; a folder apart, as sixty other packages would come with it.
+LMMS_EVAL := $(VENV)/lmms-eval
 # The renderer is compiled once; otherwise each process that finds it missing would compile it.
 COMPILED := $(VENV)/.compiled
 
@@ -64,11 +66,11 @@ test: $(COMPILED) $(PEERS) $(INSPECT) $(VLA_EVAL) $(ROBOTS)
 
 # The slow ones too; 2.3 hours of one core, so more than an hour on two. TESTS: some of them.
 TESTS ?= tests
-test-all: $(COMPILED) $(PEERS) $(INSPECT) $(VLA_EVAL) $(ROBOTS)
+test-all: $(COMPILED) $(PEERS) $(INSPECT) $(VLA_EVAL) $(ROBOTS) $(LMMS_EVAL)
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 3 --dist loadfile --no-loadscope-reorder $(TESTS)
 
 # Measures all tests, and lists those that are slow in tests/slow_tests.txt.
-test-times: $(COMPILED) $(PEERS) $(INSPECT) $(VLA_EVAL) $(ROBOTS)
+test-times: $(COMPILED) $(PEERS) $(INSPECT) $(VLA_EVAL) $(ROBOTS) $(LMMS_EVAL)
 	rm -rf build/processor_times
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder -p tests.processor_times
 	$(BIN)/python -m tests.processor_times
@@ -164,6 +166,10 @@ $(VLA_EVAL): $(DEVELOPED)
 
 $(ROBOTS): $(DEVELOPED)
 	$(BIN)/$(PIP) -c constraints.txt --no-deps --upgrade --target $@ inspect-robots
+	touch $@
+
+$(LMMS_EVAL): $(DEVELOPED)
+	$(BIN)/$(PIP) -c constraints.txt --no-deps --upgrade --target $@ 'lmms-eval==0.7.3' loguru tenacity python-dotenv jsonlines
 	touch $@
 
 $(INSPECT):

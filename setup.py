@@ -21,6 +21,7 @@ setup(
         "infthor_eval.plans.published": ["*.yaml"],
         "infthor_eval.household": ["*.yaml"],
         "infthor_eval.nieh": ["*.yaml"],
+        "infthor_eval.harness.lmms": ["_pairs", "*.yaml"],
         "infthor_eval.pages": ["*.css", "*.js"],
         "infthor_eval.report": [
             "inspection.*",

@@ -116,7 +116,7 @@ class FrameRef:
             DataError: the file is missing, truncated, or no image of a valid size.
         """
         with _open(self.path) as image:
-            return _as_shown(image)
+            return as_shown(image)
 
     def png(self) -> bytes:
         """Return the frame as the content of a PNG file.
@@ -209,7 +209,7 @@ def _wrong_size(path: SetPath, width: int, height: int) -> str | None:
     return None
 
 
-def _as_shown(image: Image.Image) -> Image.Image:
+def as_shown(image: Image.Image) -> Image.Image:
     """Return an opened picture in RGB, as it is shown."""
     turn = _TURNS.get(_orientation(image))  # before decoding: browsers ignore EXIF data behind it
     if image.mode.startswith("I"):
@@ -227,7 +227,7 @@ def _as_shown(image: Image.Image) -> Image.Image:
 
 
 def _conversions(image: Image.Image) -> str:
-    """Return what `_as_shown` does to an opened picture, in words; empty if it needs nothing."""
+    """Return what `as_shown` does to an opened picture, in words; empty if it needs nothing."""
     done = {
         "16-bit grey": image.mode.startswith("I"),
         "CMYK": image.mode == "CMYK",

@@ -27,6 +27,7 @@ PARSED_PAGES = {
     "docs/engines.md": GPU,
     "docs/figures.md": HOURS,
     "docs/howto/inspect-robots.md": OTHERS,
+    "docs/howto/lmms-eval.md": READERS,
     "docs/howto/own-scenes.md": HOURS,
     "docs/howto/publish-a-set.md": READERS,
     "docs/howto/trackers.md": "needs an account of a tracker",
