@@ -99,7 +99,8 @@ def process_pair(doc: Doc, results: list[str]) -> dict[str, Any]:
 def net_pairs(sides: Sequence[_Side]) -> float:
     """Return pairs right less pairs exchanged (aggregation of `nieh_twins`).
 
-    Questions whose twin was not asked are in no pair; without any pair it is 0.
+    Questions whose twin was not asked are in no pair, and placebos count as none; without any pair
+    it is 0.
     """
     return _mean(sides, "net_pairs")
 
@@ -119,8 +120,14 @@ def _mean(sides: Sequence[_Side], metric: str) -> float:
     for side in sides:
         if side.pair:
             pairs.setdefault((side.pair, side.variant), []).append(side)
-    scores = [_shares(*both).by_metric[metric] for both in pairs.values() if len(both) == 2]
+    whole = [both for both in pairs.values() if len(both) == 2 and not _is_placebo(*both)]
+    scores = [_shares(*both).by_metric[metric] for both in whole]
     return fmean(scores) if scores else 0.0
+
+
+def _is_placebo(one: _Side, two: _Side) -> bool:
+    """Return True for a pair with one answer, which tells nothing of memory."""
+    return one.answers == two.answers
 
 
 def _shares(one: _Side, two: _Side) -> PairShares:
