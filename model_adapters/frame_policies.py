@@ -42,7 +42,7 @@ class FrameEpisodes:
         """See `Policy`."""
         return self._policy.act(observation.image, self._instruction)
 
-    def end(self, *, success: bool) -> None:
+    def end(self, *, success: bool | None) -> None:
         """Do nothing."""
 
     def close(self) -> None:

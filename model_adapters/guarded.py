@@ -216,7 +216,7 @@ class _GuardedPolicy(_Guarded):
             )
         return tuple(chunk)
 
-    def end(self, *, success: bool) -> None:
+    def end(self, *, success: bool | None) -> None:
         """See `Policy`."""
         with wrap_request_errors(self.name):
             self._adapter.end(success=success)

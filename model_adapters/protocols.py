@@ -400,8 +400,13 @@ class Policy(Subject, Protocol):
             DataError: a frame cannot be read.
         """
 
-    def end(self, *, success: bool) -> None:
-        """End the episode; not called where the policy failed."""
+    def end(self, *, success: bool | None) -> None:
+        """End the episode; not called where the policy failed.
+
+        Args:
+            success: whether it succeeded; None where that would tell a later episode what it is to
+                remember.
+        """
 
 
 @runtime_checkable

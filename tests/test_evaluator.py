@@ -4,7 +4,7 @@ import pytest
 
 import infthor_eval
 from infthor_eval import Evaluator
-from infthor_eval.errors import UsageError
+from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.thor.simulator import Simulator
 from model_adapters import ArmDelta, Capabilities, load
 
@@ -63,3 +63,32 @@ def test_an_object_that_is_no_policy_is_refused(tmp_path):
         pytest.raises(UsageError, match="which needs a policy that drives an arm"),
     ):
         evaluator(load("qwen2.5-vl-tiny", {}, 0))
+
+
+class Failing(Counting):
+    """Fails in some episodes, by their numbers."""
+
+    name = "failing"
+
+    def __init__(self, fails):
+        super().__init__()
+        self.fails = fails
+
+    def act(self, frame, instruction):
+        if self.n_episodes in self.fails:
+            raise RuntimeError("no more hands")
+        return super().act(frame, instruction)
+
+
+def test_units_that_fail_are_told(tmp_path):
+    with Evaluator("manipulathor_pickup_mini", limit=2, out=str(tmp_path)) as evaluator:
+        with pytest.warns(UserWarning, match=r"1 of 2 units failed: .*no more hands"):
+            evaluator(Failing({1}))
+        with pytest.raises(ModelError, match=r"all 2 units failed: .*hands.*fix the adapter"):
+            evaluator(Failing({1, 2}))
+        with pytest.raises(UsageError, match="give an object"):
+            evaluator("blind")
+    with pytest.raises(UsageError, match="in a block"):
+        evaluator(Counting())
+    with pytest.raises(UsageError, match="is called with the model"):
+        Evaluator("manipulathor_pickup_mini", model="still")

@@ -3,6 +3,7 @@ process."""
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from infthor_eval.errors import UsageError
+from infthor_eval.errors import ModelError, UsageError
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -34,6 +35,8 @@ class Evaluator:
     """
 
     def __init__(self, tasks: str | Sequence[str], **options: Any) -> None:
+        if "model" in options:
+            raise UsageError("model: an Evaluator is called with the model; leave it out")
         self._options = {**options, "tasks": tasks, "model": _PLACEHOLDER}
         self._stack = ExitStack()
         self._runs: list[PreparedRun] = []
@@ -43,9 +46,10 @@ class Evaluator:
         from infthor_eval.runs import prepare_all
         from infthor_eval.storage.scratch import ScratchFolder
 
-        if "out" not in self._options:
-            self._options["out"] = str(self._stack.enter_context(ScratchFolder()))
-        requests = _requests(self._options)
+        options = self._options
+        if "out" not in options:
+            options = {**options, "out": str(self._stack.enter_context(ScratchFolder()))}
+        requests = _requests(options)
         draw_missing(requests)
         self._runs = prepare_all(requests)
         for run in self._runs:
@@ -55,6 +59,7 @@ class Evaluator:
         return self
 
     def __exit__(self, *_: object) -> None:
+        self._runs = []
         self._stack.close()
 
     def __call__(self, model: Model | Policy | FramePolicy, name: str = "") -> dict[str, float]:
@@ -66,26 +71,45 @@ class Evaluator:
                 earlier run of the name is kept beside it.
 
         Raises:
-            InfthorError: as the command would say in one line.
+            InfthorError: as the command would say in one line; no unit has a result.
+
+        Warns:
+            UserWarning: some units failed, which the scores leave out.
         """
-        return {
-            task: rate.mean
-            for outcome in self.outcomes(model, name)
-            for task, rate in outcome.run.suite.primary_metrics(outcome.summary.summary).items()
-        }
+        scores: dict[str, float] = {}
+        for outcome in self.outcomes(model, name):
+            _tell_failures(outcome)
+            found = outcome.run.suite.primary_metrics(outcome.summary.summary)
+            scores |= {task: rate.mean for task, rate in found.items()}
+        return scores
 
     def outcomes(self, model: Model | Policy | FramePolicy, name: str = "") -> list[RunOutcome]:
         """Return the runs of a model; see `__call__`."""
         from infthor_eval.exports.lm_eval import export
         from infthor_eval.runs import execute
         from infthor_eval.runs.request import IN_MEMORY
+        from model_adapters.guarded import guard
 
+        if not self._runs:
+            raise UsageError("an Evaluator is used in a block: with Evaluator(...) as evaluator")
+        if isinstance(model, str):
+            raise UsageError(f"{model}: give an object; infthor_eval.evaluate takes names")
+        model = guard(getattr(model, "name", "(in memory)"), model)
         outcomes = []
         for run in self._runs:
             request = replace(run.request, model=IN_MEMORY, name=name or model.name, fresh=True)
             outcomes.append(execute(replace(run, request=request), loaded=model))
             export(outcomes[-1])
         return outcomes
+
+
+def _tell_failures(outcome: RunOutcome) -> None:
+    failures = [record.failure for record in outcome.records if record.failure]
+    if failures and len(failures) == len(outcome.records):
+        raise ModelError(f"all {len(failures)} units failed: {failures[0]}")
+    if failures:
+        text = f"{len(failures)} of {len(outcome.records)} units failed: {failures[0]}"
+        warnings.warn(text, stacklevel=3)
 
 
 def evaluate(model: Any, options: Mapping[str, Any]) -> DataFrame:

@@ -64,7 +64,7 @@ class ArmActor(Protocol):
             DataError: the frame cannot be read.
         """
 
-    def end(self, *, success: bool) -> None:
+    def end(self, *, success: bool | None) -> None:
         """Be told that the episode is over."""
 
 
@@ -99,7 +99,7 @@ class PolicyActor:
         check_chunk(self._policy.name, chunk)
         return chunk
 
-    def end(self, *, success: bool) -> None:
+    def end(self, *, success: bool | None) -> None:
         """See `ArmActor`."""
         self._policy.end(success=success)
 
@@ -127,7 +127,7 @@ class _ArmBaseline(BaselineSubject):
 
 
 class _BaselineActor:
-    def end(self, *, success: bool) -> None:
+    def end(self, *, success: bool | None) -> None:
         """Do nothing."""
 
 

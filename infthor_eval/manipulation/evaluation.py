@@ -243,7 +243,7 @@ class ArmRunner(EpisodeRunner[ArmEnvironment, ArmRecord]):
                 ended=str(ended),
                 nears_other=environment.nears_other(),
             )
-            self._actor.end(success=record.done)
+            self._actor.end(success=None if task.tells_history else record.done)
         reward = task.settings.reward if record.done else 0.0
         return EpisodeResult(msgspec.structs.replace(record, reward=reward))
 

@@ -76,7 +76,7 @@ class Session:
             raise ModelError(f"{self.server} answers without actions ({given}); see its log")
         return self.convention.deltas(self.server, answer["actions"])
 
-    def end(self, *, success: bool) -> None:
+    def end(self, *, success: bool | None) -> None:
         """End the episode, and tell the server likewise."""
         self.episode = None
 
@@ -218,7 +218,7 @@ class RemotePolicy:
         with self._dropping():
             return self._begun().act(observation)[: self._options.execute]
 
-    def end(self, *, success: bool) -> None:
+    def end(self, *, success: bool | None) -> None:
         """See `Policy`; raises `ModelError` where the server can no longer be told."""
         with self._dropping():
             self._begun().end(success=success)

@@ -49,11 +49,12 @@ class VlaEvalSession(Session):
         }
         self._start = self._tell("EPISODE_START", {"task": task, "mode": "sync"})
 
-    def end(self, *, success: bool) -> None:
+    def end(self, *, success: bool | None) -> None:
         """See `Session`; as in the package's own runner, each observation counts as a step."""
         super().end(success=success)
         seconds = time.monotonic() - self._started
-        said = {"metrics": {"success": success}, "steps": self._n_observations}
+        metrics = {} if success is None else {"success": success}
+        said = {"metrics": metrics, "steps": self._n_observations}
         self._tell("EPISODE_END", said | {"elapsed_sec": seconds})
 
     def _greet(self) -> None:

@@ -35,8 +35,8 @@ def test_the_bundled_set_is_small_and_has_every_type_and_number_of_clues():
 
 def test_the_bundled_sets_are_few_files():
     files = [path for path in BUNDLED.parent.rglob("*") if path.is_file()]
-    assert len(files) <= 40
-    assert sum(path.stat().st_size for path in files) < 19.6e6
+    assert len(files) <= 48
+    assert sum(path.stat().st_size for path in files) < 26e6
 
 
 def test_the_bundled_questions_follow_from_the_bundled_logs():

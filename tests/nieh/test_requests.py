@@ -60,6 +60,7 @@ def test_every_task_is_among_them():
         "nieh_memory",
         "nieh_memory_frames",
         "nieh_memory_notes",
+        "nieh_mini_arm_twins",
         "nieh_mini_long",
         "nieh_mini_memory",
         "nieh_mini_twins",

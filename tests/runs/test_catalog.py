@@ -37,7 +37,7 @@ def test_each_task_says_what_distinguishes_it_and_that_is_no_setting():
 
 
 @pytest.mark.parametrize(
-    ("name", "near"), [("nieh_ful", "'nieh_full'"), ("neih", "'nieh'"), ("xyz", "nieh_mini_gt")]
+    ("name", "near"), [("nieh_ful", "'nieh_full'"), ("neih", "'nieh'"), ("xyz", "nieh_gt")]
 )
 def test_an_unknown_name_is_answered_with_the_nearest(name, near):
     with pytest.raises(UsageError) as caught:

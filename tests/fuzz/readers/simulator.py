@@ -157,7 +157,11 @@ def _view(folder: Path) -> None:
                 return
             metadata["objects"] = ReceivedObjects(msgspec.Raw(packed))
         event = SimpleNamespace(
-            metadata=metadata, frame=None, depth_frame=None, instance_segmentation_frame=None
+            third_party_camera_frames=[],
+            metadata=metadata,
+            frame=None,
+            depth_frame=None,
+            instance_segmentation_frame=None,
         )
         view_of(event)
 

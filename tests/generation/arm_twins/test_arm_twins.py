@@ -167,7 +167,7 @@ class Watching:
         return ()  # gives up
 
     def end(self, *, success):
-        assert not success
+        assert success is None  # it would tell the twin what is right
 
     def close(self):
         pass
