@@ -43,6 +43,65 @@ class CannotAttendError(ModelError):
     """A model attends in a way that cannot be taken the place of."""
 
 
+class _Planned:
+    """Attention and masks by plans, in the form of transformers' functions."""
+
+    def __init__(self, device: torch.device, plan: PlanMaker, hint: str) -> None:
+        self._device = device
+        self._plan = plan
+        self._hint = hint
+        self._plans: list[Plan] = []
+        self._n_calls = 0
+
+    def mask(
+        self,
+        *,
+        mask_function: MaskFunction,
+        use_vmap: bool = False,
+        local_size: int | None = None,
+        **_sizes: Any,
+    ) -> Tensor:
+        """Return the number of a plan, in place of a mask as long as the context."""
+        if use_vmap:
+            raise CannotAttendError(f"the model adds rules of its own to masks; {self._hint}")
+        self._plans.append(self._plan(mask_function, local_size))
+        return torch.full((1, 1, 1, 1), len(self._plans) - 1, device=self._device)
+
+    def attention(
+        self,
+        module: Any,
+        query: Tensor,
+        key: Tensor,
+        value: Tensor,
+        attention_mask: Tensor | None,
+        *,
+        scaling: float | None = None,
+        **others: Any,
+    ) -> tuple[Tensor, None]:
+        """Return the outputs, (1, new tokens, heads, head size), of queries, (1, heads, new tokens,
+        head size), on keys and values, (1, key heads, stored tokens, head size)."""
+        self._n_calls += 1
+        added = [name for name in _NOT_COMPUTED if others.get(name) is not None]
+        if added:
+            raise CannotAttendError(f"the model's attention has {added[0]}; {self._hint}")
+        if attention_mask is None or attention_mask.dtype != torch.long:
+            raise CannotAttendError(
+                f"the model's masks are not all made by transformers' functions; {self._hint}"
+            )
+        # Heads that share keys become the second axis, along which a view repeats keys.
+        queries = query[0].unflatten(0, (key.shape[1], -1))
+        attend_by = self._plans[int(attention_mask)]
+        output = attend_by(module.layer_idx, queries, key[0, :, None], value[0, :, None], scaling)
+        return output.flatten(0, 1).transpose(0, 1)[None], None
+
+    def require_layers(self, n_layers: int) -> None:
+        """Raise CannotAttendError unless all layers were given attention, each as often."""
+        if self._n_calls == 0 or self._n_calls % n_layers:
+            raise CannotAttendError(
+                f"the model's layers do not all attend by transformers' interface; {self._hint}"
+            )
+
+
 @contextmanager
 def attending(config: Any, device: torch.device, plan: PlanMaker, hint: str) -> Iterator[None]:
     """Let a decoder attend by plans within the context, in which it is run.
@@ -58,66 +117,21 @@ def attending(config: Any, device: torch.device, plan: PlanMaker, hint: str) -> 
             that add something to the scores, or with masks that are not made by transformers'
             functions of positions.
     """
-    plans: list[Plan] = []
-    n_calls = 0
-
-    def mask(
-        *,
-        mask_function: MaskFunction,
-        use_vmap: bool = False,
-        local_size: int | None = None,
-        **_sizes: Any,
-    ) -> Tensor:
-        """Return the number of a plan, in place of a mask as long as the context."""
-        if use_vmap:
-            raise CannotAttendError(f"the model adds rules of its own to masks; {hint}")
-        plans.append(plan(mask_function, local_size))
-        return torch.full((1, 1, 1, 1), len(plans) - 1, device=device)
-
-    def attention(
-        module: Any,
-        query: Tensor,
-        key: Tensor,
-        value: Tensor,
-        attention_mask: Tensor | None,
-        *,
-        scaling: float | None = None,
-        **others: Any,
-    ) -> tuple[Tensor, None]:
-        """Return the outputs, (1, new tokens, heads, head size), of queries, (1, heads, new tokens,
-        head size), on keys and values, (1, key heads, stored tokens, head size)."""
-        nonlocal n_calls
-        n_calls += 1
-        added = [name for name in _NOT_COMPUTED if others.get(name) is not None]
-        if added:
-            raise CannotAttendError(f"the model's attention has {added[0]}; {hint}")
-        if attention_mask is None or attention_mask.dtype != torch.long:
-            raise CannotAttendError(
-                f"the model's masks are not all made by transformers' functions; {hint}"
-            )
-        # Heads that share keys become the second axis, along which a view repeats keys.
-        queries = query[0].unflatten(0, (key.shape[1], -1))
-        attend_by = plans[int(attention_mask)]
-        output = attend_by(module.layer_idx, queries, key[0, :, None], value[0, :, None], scaling)
-        return output.flatten(0, 1).transpose(0, 1)[None], None
-
+    planned = _Planned(device, plan, hint)
     before = config._attn_implementation
-    name = f"plans_{id(plans)}"
+    name = f"plans_{id(planned)}"
     # The functions are put into the dictionaries directly, because registered ones cannot be
     # removed; transformers looks for masks in that of the class.
     masks = AttentionMaskInterface._global_mapping
-    ALL_ATTENTION_FUNCTIONS[name] = attention
-    masks[name] = mask
+    ALL_ATTENTION_FUNCTIONS[name] = planned.attention
+    masks[name] = planned.mask
     config._attn_implementation = name
     try:
         yield
     finally:
         config._attn_implementation = before
         del ALL_ATTENTION_FUNCTIONS[name], masks[name]
-    if n_calls == 0 or n_calls % config.num_hidden_layers:
-        raise CannotAttendError(
-            f"the model's layers do not all attend by transformers' interface; {hint}"
-        )
+    planned.require_layers(config.num_hidden_layers)
 
 
 def by_mask(seen: Tensor) -> Plan:
