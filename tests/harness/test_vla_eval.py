@@ -3,6 +3,7 @@ own command."""
 
 import json
 import sys
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -47,8 +48,9 @@ def evaluate(tmp_path, data):
         entry["params"].setdefault("data", str(data))
         out = tmp_path / "theirs"
         config = {"benchmarks": [entry], "output_dir": str(out), "render": "cpu"}
-        with vla_eval.serve_background(server) as served:
-            vla_eval.run(config, server_url=served.url, docker=False)
+        # In a thread: a loop may run in this one that another test has left.
+        with vla_eval.serve_background(server) as served, ThreadPoolExecutor(1) as pool:
+            pool.submit(vla_eval.run, config, server_url=served.url, docker=False).result()
         written = json.loads((out / "arm_aggregate.json").read_text())
         return {task["task"]: task["episodes"][0] for task in written["tasks"]}
 
