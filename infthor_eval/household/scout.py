@@ -5,7 +5,7 @@ back, which moves nothing else and is not part of the trajectory.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -67,7 +67,7 @@ def find_viewpoint(
     best = None
     trials_left = _EXTRA_TRIALS
     for viewpoint in list(_candidates(start, grid, focus, distances))[:_MAX_TRIALS]:
-        view = _teleport(simulator, grid, start, viewpoint)
+        view = view_from(simulator, grid, start, viewpoint)
         qualifies = view.success and _shows(view, targets, min_pixels)
         if qualifies and (
             inside is None or _comes_into_view(simulator, targets[0], inside, min_pixels)
@@ -160,12 +160,17 @@ def _bearing(position: tuple[float, float], facing: int, target: Vector) -> tupl
     return math.hypot(dx, dz), abs(angle)
 
 
-def _teleport(
-    simulator: Simulator, grid: Grid, start: SimulatorView, viewpoint: Viewpoint
+def view_from(
+    simulator: Simulator,
+    grid: Grid,
+    start: SimulatorView,
+    viewpoint: Viewpoint,
+    rendering: Mapping[str, Any] = _NO_IMAGE,
 ) -> SimulatorView:
+    """Teleport the agent, and return what it sees, without the image unless `rendering` has it."""
     x, z = grid.position(viewpoint.pose.cell)
     position = Vector(x, start.agent.position.y, z)
     pose = AgentPose(
         position, float(viewpoint.pose.facing), float(viewpoint.horizon), start.agent.standing
     )
-    return simulator.query(**teleport_call(pose, force=False), **_NO_IMAGE)
+    return simulator.query(**teleport_call(pose, force=False), **rendering)

@@ -3,6 +3,9 @@
 from collections.abc import Callable
 from pathlib import Path
 
+from infthor_eval.episodes.records import InfeasibleError
+from infthor_eval.errors import SimulatorError
+from infthor_eval.manipulation.environment import ArmEnvironment
 from tests.helpers.command_line import option_words
 from tests.helpers.journals import read_records
 from tests.helpers.trajectories import FORK, MUG, cut_trajectory, write_trajectories
@@ -40,3 +43,23 @@ def own_successes(run_cli: Callable[..., tuple[int, str, str]], **options: objec
     assert code == 0, err
     records = read_records(Path(str(options["out"])))
     return {f"{it.task}/{it.id}": it.payload.done for it in records}
+
+
+def lose_two_episodes(monkeypatch):
+    """Have the first episode not begin, and the second one lose its simulator."""
+    begun = []
+    reset, step = ArmEnvironment.reset, ArmEnvironment.step
+
+    def reset_but_first(self, *given):
+        begun.append(given)
+        if len(begun) == 1:
+            raise InfeasibleError("the mug cannot be brought to where it was")
+        return reset(self, *given)
+
+    def step_but_second(self, action):
+        if len(begun) == 2:
+            raise SimulatorError("the simulator is lost")
+        return step(self, action)
+
+    monkeypatch.setattr(ArmEnvironment, "reset", reset_but_first)
+    monkeypatch.setattr(ArmEnvironment, "step", step_but_second)

@@ -7,12 +7,16 @@ from pathlib import Path
 
 import pytest
 
-from infthor_eval.episodes.records import InfeasibleError
-from infthor_eval.errors import SimulatorError
-from infthor_eval.manipulation.environment import ArmEnvironment
 from infthor_eval.plugins import import_target
 from model_adapters import load
-from tests.harness.doors import MAX_STEPS, SCRIPT, own_successes, write_data, write_short_tasks
+from tests.harness.doors import (
+    MAX_STEPS,
+    SCRIPT,
+    lose_two_episodes,
+    own_successes,
+    write_data,
+    write_short_tasks,
+)
 from tests.helpers.peers import needs_peer, peer_imports
 
 pytestmark = needs_peer("inspect-robots")
@@ -108,22 +112,7 @@ def test_a_policy_is_shown_the_wrist_and_told_of_the_hand(policy, evaluate):
 def test_an_episode_that_cannot_begin_or_loses_its_simulator_has_no_score(
     monkeypatch, policy, evaluate
 ):
-    begun = []
-    reset, step = ArmEnvironment.reset, ArmEnvironment.step
-
-    def reset_but_first(self, *given):
-        begun.append(given)
-        if len(begun) == 1:
-            raise InfeasibleError("the mug cannot be brought to where it was")
-        return reset(self, *given)
-
-    def step_but_second(self, action):
-        if len(begun) == 2:
-            raise SimulatorError("the simulator is lost")
-        return step(self, action)
-
-    monkeypatch.setattr(ArmEnvironment, "reset", reset_but_first)
-    monkeypatch.setattr(ArmEnvironment, "step", step_but_second)
+    lose_two_episodes(monkeypatch)
     log = evaluate(policy(), limit=3)
     first, second, third = log.samples
     assert first.error == "EpisodeNotRun: the mug cannot be brought to where it was"

@@ -8,14 +8,13 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from infthor_eval.episodes.records import InfeasibleError
-from infthor_eval.errors import SimulatorError, UsageError
-from infthor_eval.manipulation.environment import ArmEnvironment
+from infthor_eval.errors import UsageError
 from model_adapters import load
 from tests.harness.doors import (
     MAX_STEPS,
     SCRIPT,
     TASKS,
+    lose_two_episodes,
     own_successes,
     write_data,
     write_short_tasks,
@@ -133,22 +132,7 @@ def test_another_action_fails_its_episode_alone(action, said, evaluate):
 def test_an_episode_that_cannot_begin_or_loses_its_simulator_fails_alone(monkeypatch, evaluate):
     from tests.harness.vla_eval_servers import SameServer
 
-    begun = []
-    reset, step = ArmEnvironment.reset, ArmEnvironment.step
-
-    def reset_but_first(self, *given):
-        begun.append(given)
-        if len(begun) == 1:
-            raise InfeasibleError("the mug cannot be brought to where it was")
-        return reset(self, *given)
-
-    def step_but_second(self, action):
-        if len(begun) == 2:
-            raise SimulatorError("the simulator is lost")
-        return step(self, action)
-
-    monkeypatch.setattr(ArmEnvironment, "reset", reset_but_first)
-    monkeypatch.setattr(ArmEnvironment, "step", step_but_second)
+    lose_two_episodes(monkeypatch)
     episodes = evaluate(SameServer({"actions": np.zeros(7)}), limit=2)
     failed = {it["failure_reason"]: it for it in episodes.values() if "failure_reason" in it}
     assert set(failed) == {"env_start", "env_step"}

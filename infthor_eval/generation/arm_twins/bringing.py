@@ -24,11 +24,11 @@ from infthor_eval.generation.walking import Walker
 from infthor_eval.household.affordances import goes_into
 from infthor_eval.household.containment import direct_parent
 from infthor_eval.household.navigation import Grid, GridPose
-from infthor_eval.household.scout import Viewpoint, grid_pose_of, reachable_grid
+from infthor_eval.household.scout import Viewpoint, grid_pose_of, reachable_grid, view_from
 from infthor_eval.household.wording import canonical_type
 from infthor_eval.thor.restore import restore
 from infthor_eval.thor.simulator import NO_RENDERING, Simulator
-from infthor_eval.thor.view import AgentPose, SimulatorView, ThorObject, Vector, teleport_call
+from infthor_eval.thor.view import SimulatorView, ThorObject, teleport_call
 
 _SURFACES = ("CoffeeTable", "CounterTop", "Desk", "DiningTable", "Dresser", "SideTable", "TVStand")
 _TAIL = 10  # actions at least of which no picture tells the worlds apart
@@ -308,12 +308,9 @@ def _seen_from(
     simulator: Simulator, grid: Grid, viewpoint: Viewpoint, **rendering: Any
 ) -> SimulatorView:
     """Return what an agent sees from a pose; it is brought back."""
-    here = simulator.view.agent
-    x, z = grid.position(viewpoint.pose.cell)
-    facing, horizon = float(viewpoint.pose.facing), float(viewpoint.horizon)
-    pose = AgentPose(Vector(x, here.position.y, z), facing, horizon, here.standing)
-    seen = simulator.query(**teleport_call(pose, force=False), **rendering)
-    simulator.query(**{**teleport_call(here), **NO_RENDERING})
+    start = simulator.view
+    seen = view_from(simulator, grid, start, viewpoint, rendering)
+    simulator.query(**{**teleport_call(start.agent), **NO_RENDERING})
     return seen
 
 
