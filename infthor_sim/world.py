@@ -74,6 +74,8 @@ class World:
         active: id of the agent that acts, or whose part of a reply is made.
         seed: seed of the scene's random numbers.
         version: number that grows with every change; cached views compare it.
+        version_around: the version since which nothing changed but the pose of what the only agent
+            carries in its hand.
         coarse: the shapes of its furniture are only known as boxes, as in recordings.
         walls: walls of rooms that are not `walled`.
         open_at_start: ids of the objects that are open in the recording; its cells already go
@@ -94,6 +96,7 @@ class World:
     active: int = 0
     seed: int = 0
     version: int = 0
+    version_around: int = 0
     coarse: bool = False
     floor: NavGrid | None = None
     walls: tuple[Wall, ...] = ()
@@ -132,6 +135,7 @@ class World:
         # not even when a new object gets the id of a removed one, and caches by id and version are
         # safe.
         self.version += 1
+        self.version_around = self.version
         for item in changed:
             item.version = self.version
 
@@ -232,7 +236,10 @@ class World:
             agent.hand = HAND_AT_REST
         if agent.held is not None:
             item = self.objects[agent.held]
+            around = self.version_around
             self.set_pose(item, *self._held_pose(item))
+            if len(self.agents) == 1:  # another one sees it move
+                self.version_around = around
         if self.arm is not None:
             wrist = self.arm.wrist(agent)
             # Contents have grips of their own: an arm tilts what it holds, which `set_pose` would

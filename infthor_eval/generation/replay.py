@@ -20,6 +20,7 @@ from infthor_eval.generation.motion import intermediate_views
 from infthor_eval.generation.simulator_jobs import JobProgress, OnProgress, ignore_progress
 from infthor_eval.household.sequence_text import sequence_text
 from infthor_eval.household.state_summary import state_summaries
+from infthor_eval.storage.background import Background
 from infthor_eval.thor.actions import text_of
 from infthor_eval.thor.drawn_pictures import DrawnPictures
 from infthor_eval.thor.grounding import Grounding
@@ -115,12 +116,12 @@ def replay(
     if needs_all and report.restore:
         return report
     (folder / "img").mkdir()
-    with PngWriter(folder / "img") as frame_files:
+    with PngWriter(folder / "img") as frame_files, Background("log") as entries:
         steps = () if beginning is None else beginning.steps
-        run = _Run(simulator, actions, Recorder(frame_files, drawn, steps), frames)
+        run = _Run(simulator, actions, Recorder(frame_files, drawn, steps), entries, frames)
         todo: Sequence[tuple[int, LowAction]] = list(enumerate(trajectory.plan.low_actions))
         if beginning is None:
-            run.recorder.record(simulator.view)
+            run.record(simulator.view)
         else:
             todo = run.go_on(beginning, todo, frame_files)
         for index, low in todo:
@@ -282,13 +283,19 @@ class ActionReplay:
 
 
 class _Run:
-    """The recording of one replay."""
+    """The recording of one replay, whose entries are made while the simulator goes on."""
 
     def __init__(
-        self, simulator: Simulator, actions: ActionReplay, recorder: Recorder, frames: int
+        self,
+        simulator: Simulator,
+        actions: ActionReplay,
+        recorder: Recorder,
+        entries: Background,
+        frames: int,
     ) -> None:
         self._simulator = simulator
         self._actions = actions
+        self._entries = entries
         self._frames = frames
         self.recorder = recorder
 
@@ -309,19 +316,21 @@ class _Run:
         target, error = self._actions.execute(index, low)
         after = self._simulator.view.agent
         for view in intermediate_views(self._simulator, before.agent, after, self._frames):
-            self.recorder.record(view, step=index, high_idx=low.high_idx)
+            self.record(view, step=index, high_idx=low.high_idx)
         putting = low.api_action.action == "PutObject"
-        step = self.recorder.record(
+        self.record(
             self._simulator.view,
             step=index,
             action=_text_of(low),
+            error=error,
             high_idx=low.high_idx,
             target=next(iter(before.inventory), None) if putting else target,
             receptacle=target if putting else None,
         )
-        # Set here, as an action that could not be called at all has no reply of the simulator.
-        step.success = error is None
-        step.error = error
+
+    def record(self, view: SimulatorView, **entry: Any) -> None:
+        self.recorder.draw(view)
+        self._entries.run(self.recorder.record, view, **entry)
 
 
 def _text_of(low: LowAction) -> str:

@@ -85,7 +85,8 @@ class Walker:
         # the grid, so that the next path leads around it.
         target = self._trace.view.objects[object_ids[0]].object_type if object_ids else "the place"
         while (moves := self._moves(viewpoint)) is not None:
-            if all(self._move(action) for action in moves):
+            last = len(moves) - 1
+            if all(self._move(it, is_seen=number == last) for number, it in enumerate(moves)):
                 break
         else:
             raise RolloutError(f"no way to {target}")
@@ -107,16 +108,22 @@ class Walker:
         steps = round((viewpoint.horizon - self._trace.view.agent.horizon) / HORIZON_STEP)
         return ["LookDown" if steps > 0 else "LookUp"] * abs(steps)
 
-    def _move(self, action: str) -> bool:
-        """Execute one action of a walk; returns False if blocked, and removes the cell."""
+    def _move(self, action: str, is_seen: bool = True) -> bool:
+        """Execute one action of a walk; returns False if blocked, and removes the cell.
+
+        Which objects its frame shows is asked where something may be acted on next (`is_seen`).
+        """
+        quiet = {} if is_seen else {"renderInstanceSegmentation": False}
         if action != "MoveAhead":
             degrees = _TURN if action.startswith("Rotate") else HORIZON_STEP
-            self._trace.act(ApiAction(action), {"degrees": float(degrees)}, str(degrees))
+            turn = {"degrees": float(degrees), **quiet}
+            self._trace.act(ApiAction(action), turn, str(degrees))
             return True
         grid = self._cells()
         pose = grid_pose_of(self._trace.view.agent, grid)
         try:
-            self._trace.act(ApiAction(action, move_magnitude=GRID), {"moveMagnitude": GRID}, "25")
+            ahead = {"moveMagnitude": GRID, **quiet}
+            self._trace.act(ApiAction(action, move_magnitude=GRID), ahead, "25")
         except RolloutError:
             self._grid = grid.without_cell(pose.ahead)
             return False

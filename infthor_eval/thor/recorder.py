@@ -2,6 +2,7 @@
 
 from collections import deque
 from collections.abc import Sequence
+from operator import attrgetter
 
 from infthor_eval.errors import SimulatorError
 from infthor_eval.formats.object_ids import object_type_of
@@ -18,6 +19,12 @@ from infthor_eval.thor.drawn_pictures import DrawnPictures
 from infthor_eval.thor.outline import shares_in_frame
 from infthor_eval.thor.segmentation import Instance
 from infthor_eval.thor.view import SimulatorView, ThorObject
+
+# All that `state_of` reads: for most objects it is what it was a frame before.
+_TOLD = attrgetter(
+    "object_type", "parent_receptacles", "position", "is_picked_up", "openable", "is_open",
+    "toggleable", "is_toggled", "is_sliced", "is_dirty", "is_cooked", "temperature",
+)  # fmt: skip
 
 
 class Recorder:
@@ -40,49 +47,15 @@ class Recorder:
         self._drawn = drawn
         states = deque(iter_object_states(beginning), maxlen=1)
         self._states = {key: it for last in states for key, it in last.items() if it.exists}
+        self._told: dict[str, tuple[object, ...]] = {}
+        self._n_drawn = len(beginning)
         self.steps = list(beginning)
 
-    def record(
-        self,
-        view: SimulatorView,
-        *,
-        step: int = 0,
-        action: str | None = None,
-        high_idx: int | None = None,
-        target: str | None = None,
-        receptacle: str | None = None,
-    ) -> Step:
-        """Add one frame.
-
-        Args:
-            step: index of the action; 0 also for the first frame.
-            action: text of the action; None for the first frame.
-            high_idx: index of the action's sub-goal.
-            target: id of the object acted on.
-            receptacle: id of the receptacle acted on.
-        """
-        number = len(self.steps)
-        entry = Step(
-            img_idx=number,
-            img_filename=f"{number:09d}.png",
-            step=step,
-            object_log=object_log(view),
-            action=action,
-            success=view.success or action is None,
-            error=None if view.success or action is None else view.error,
-            high_idx=high_idx,
-            pose=_pose(view),
-            target=target,
-            receptacle=receptacle,
-            seen=_objects_in_frame(view),
-            changes=self._changes(view),
-        )
-        if self._images is not None:
-            self._write(self._images, entry.img_filename, view)
-        self.steps.append(entry)
-        return entry
-
-    def _write(self, images: PngWriter, name: str, view: SimulatorView) -> None:
+    def draw(self, view: SimulatorView) -> None:
+        """Write the next frame's file."""
+        images, name = self._images, _file_name(self._n_drawn)
+        self._n_drawn += 1
+        assert images is not None
         if self._drawn is not None and view.image_digest is not None:
             self._drawn.write(images, name, view, view.image_digest)
         elif view.frame is not None:
@@ -90,13 +63,63 @@ class Recorder:
         else:
             raise SimulatorError(f"{name}: the simulator sent no frame; start it with rendering on")
 
+    def record(
+        self,
+        view: SimulatorView,
+        *,
+        step: int = 0,
+        action: str | None = None,
+        error: str | None = None,
+        high_idx: int | None = None,
+        target: str | None = None,
+        receptacle: str | None = None,
+    ) -> None:
+        """Add the entry of the next frame.
+
+        Args:
+            step: index of the action; 0 also for the first frame.
+            action: text of the action; None for the first frame.
+            error: why it was refused; None if it was not.
+            high_idx: index of the action's sub-goal.
+            target: id of the object acted on.
+            receptacle: id of the receptacle acted on.
+        """
+        number = len(self.steps)
+        entry = Step(
+            img_idx=number,
+            img_filename=_file_name(number),
+            step=step,
+            object_log=object_log(view),
+            action=action,
+            success=error is None,
+            error=error,
+            high_idx=high_idx,
+            pose=_pose(view),
+            target=target,
+            receptacle=receptacle,
+            seen=_objects_in_frame(view),
+            changes=self._changes(view),
+        )
+        self.steps.append(entry)
+
     def _changes(self, view: SimulatorView) -> dict[str, ObjectState]:
-        states = {key: state_of(obj) for key, obj in view.objects.items()}
-        changes = {key: state for key, state in states.items() if self._states.get(key) != state}
-        for key in self._states.keys() - states.keys():
-            changes[key] = ObjectState(self._states[key].type, exists=False)
-        self._states = states
+        changes = {}
+        for key, obj in view.objects.items():
+            told = _TOLD(obj)
+            if self._told.get(key) == told:
+                continue
+            self._told[key] = told
+            state = state_of(obj)
+            if self._states.get(key) != state:
+                changes[key] = self._states[key] = state
+        for key in self._states.keys() - view.objects.keys():
+            changes[key] = ObjectState(self._states.pop(key).type, exists=False)
+            self._told.pop(key, None)
         return changes
+
+
+def _file_name(number: int) -> str:
+    return f"{number:09d}.png"
 
 
 def object_log(view: SimulatorView) -> ObjectLog:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,44 +16,46 @@ class Instance:
     box: tuple[int, int, int, int]
 
 
-@dataclass(frozen=True, eq=False)
 class Segmentation:
-    """Which object each pixel of a frame shows.
+    """Which object each pixel of a frame shows; worked out when it is first asked for.
 
-    Attributes:
-        codes: a code for each pixel, [height, width].
-        names: objects by code; codes of walls and floors have none.
+    Args:
+        frame: the color of what each pixel shows, [height, width, 3].
+        colors: what has each color.
     """
 
-    codes: NDArray[np.uint32]
-    names: Mapping[int, str]
+    def __init__(
+        self, frame: NDArray[np.uint8], colors: Mapping[tuple[int, int, int], str]
+    ) -> None:
+        self._frame = frame
+        self._colors = colors
 
+    @cached_property
+    def codes(self) -> NDArray[np.uint32]:
+        """A code for each pixel, [height, width]."""
+        # In place, channel by channel: copies of the whole frame take four times as long.
+        codes = self._frame[..., 0].astype(np.uint32)
+        for channel in (1, 2):
+            codes <<= 8
+            codes |= self._frame[..., channel]
+        return codes
+
+    @cached_property
+    def names(self) -> dict[int, str]:
+        """Ids of objects by code; codes of walls and floors have none."""
+        # A name without "|" is a class of the structure, not an object.
+        return {
+            r << 16 | g << 8 | b: name for (r, g, b), name in self._colors.items() if "|" in name
+        }
+
+    @cached_property
     def instances(self) -> dict[str, Instance]:
-        """Return the objects in the frame by id."""
+        """The objects in the frame by id."""
         return {
             self.names[code]: instance
             for code, instance in instances_of(self.codes).items()
             if code in self.names
         }
-
-
-def segmentation_of(event: Any) -> Segmentation | None:
-    """Return the segmentation of an `ai2thor.server.Event`, None if it was not rendered."""
-    frame = event.instance_segmentation_frame
-    if frame is None:
-        return None
-    # In place, channel by channel: copies of the whole frame take four times as long.
-    codes = frame[..., 0].astype(np.uint32)
-    for channel in (1, 2):
-        codes <<= 8
-        codes |= frame[..., channel]
-    # A name without "|" is a class of the structure (walls, floor), not an object.
-    names = {
-        r << 16 | g << 8 | b: name
-        for (r, g, b), name in event.color_to_object_id.items()
-        if "|" in name
-    }
-    return Segmentation(codes, names)
 
 
 def instances_of(codes: NDArray[np.uint32]) -> dict[int, Instance]:

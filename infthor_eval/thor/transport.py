@@ -4,7 +4,8 @@ The original server opens its pipes with blocking calls and reads without watchi
 process, so it waits for ever for a simulator that died. This one opens the pipes non-blocking,
 watches the child while it waits, and raises a `PeerFault` that says what failed.
 
-The objects, which are most of a reply, are `ReceivedObjects`.
+The objects, which are most of a reply, are `ReceivedObjects`, and decoded while the simulator is at
+work: it draws its frames after it has told them.
 """
 
 import contextlib
@@ -81,6 +82,7 @@ class SafeFifoServer(FifoServer):
         self._deadline = float("inf")
         self._seconds = 0.0
         self._connected = False  # True once the simulator has sent something
+        self._is_drawn = True  # whether the next reply has frames
 
     def receive(self, timeout: float | None = None) -> MultiAgentEvent:
         """Wait for one reply.
@@ -107,7 +109,9 @@ class SafeFifoServer(FifoServer):
     def send(self, action: dict[str, Any]) -> None:
         """Send one action; raises PeerFault if the simulator died or does not read."""
         self.current_action = str(action.get("action"))
+        self._is_drawn = bool(action.get("renderImage", True))
         super().send(action)
+        self._decode_objects()  # of the last reply
 
     def stop(self) -> None:
         """Kill and reap the simulator, and remove its pipes. Calling it again does nothing."""
@@ -138,6 +142,9 @@ class SafeFifoServer(FifoServer):
                 parts = _decode(body, type=dict[str, msgspec.Raw])
                 agents = _decode(parts.pop("agents"), type=list[dict[str, msgspec.Raw]])
                 metadata = {**_decoded(parts), "agents": [_decoded(agent) for agent in agents]}
+                self.raw_metadata = metadata
+                if self._is_drawn:
+                    self._decode_objects()
             elif field is FieldType.METADATA_PATCH:  # what a query changes of the reply before
                 patch = _decoded(_decode(body, type=dict[str, msgspec.Raw]))
                 active = patch["agentId"]
@@ -154,6 +161,12 @@ class SafeFifoServer(FifoServer):
                 files[self.form_field_map[field]].append(body)
         self.raw_metadata, self.raw_files = metadata, files
         return metadata, files
+
+    def _decode_objects(self) -> None:
+        """Decode the objects that were received last, while the simulator acts or draws."""
+        for agent in (self.raw_metadata or {}).get("agents", ()):
+            if "objects" in agent:
+                agent["objects"].decode()
 
     def _send_message(self, message_type: FieldType, body: bytes) -> None:
         self._start_clock(None)

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import msgspec
@@ -13,7 +12,7 @@ from msgspec.structs import asdict
 from numpy.typing import NDArray
 
 from infthor_eval.errors import SimulatorError, in_one_line
-from infthor_eval.thor.segmentation import Instance, Segmentation, segmentation_of
+from infthor_eval.thor.segmentation import Instance, Segmentation
 
 
 class Vector(msgspec.Struct, frozen=True):
@@ -70,11 +69,33 @@ class ThorObject(msgspec.Struct, rename="camel", frozen=True):
     axis_aligned_bounding_box: Box | None = None
 
 
-class ReceivedObjects:
-    """The objects of a reply, as they came over the wire.
+class PackedObjects:
+    """The objects of a reply, decoded when they are first asked for.
 
-    They are decoded at once, as a simulator draws its frames after it has told them, so that this
-    takes no time.
+    Args:
+        packed: their list in MessagePack.
+    """
+
+    def __init__(self, packed: msgspec.Raw) -> None:
+        self._packed: msgspec.Raw | None = packed
+        self._objects: dict[str, ThorObject] = {}
+
+    @property
+    def by_id(self) -> dict[str, ThorObject]:
+        """The objects by id; raises SimulatorError if one is malformed."""
+        packed = self._packed  # another thread may decode them at the same time
+        if packed is not None:
+            try:
+                objects = msgspec.msgpack.decode(packed, type=list[ThorObject])
+            except ValueError as error:  # msgspec's errors are ValueErrors
+                raise _malformed("objects", error) from error
+            self._objects = {obj.object_id: obj for obj in objects}
+            self._packed = None
+        return self._objects
+
+
+class ReceivedObjects:
+    """The objects of a reply, as they came over the wire, and typed.
 
     Args:
         packed: their list in MessagePack.
@@ -82,13 +103,12 @@ class ReceivedObjects:
 
     def __init__(self, packed: msgspec.Raw) -> None:
         self._packed = packed
-        with suppress(ValueError):  # who reads them is told
-            self.typed  # noqa: B018
+        self.typed = PackedObjects(packed)
 
-    @cached_property
-    def typed(self) -> list[ThorObject]:
-        """The objects; a ValueError if one is malformed."""
-        return msgspec.msgpack.decode(self._packed, type=list[ThorObject])
+    def decode(self) -> None:
+        """Decode them before they are asked for, while the simulator is at work."""
+        with suppress(SimulatorError):  # who reads them is told
+            self.typed.by_id  # noqa: B018
 
     def whole(self) -> Any:
         """Return them with all their fields, as dicts."""
@@ -184,14 +204,13 @@ class SimulatorView:
     Attributes:
         frame: RGB, uint8, [height, width, 3], contiguous; None if frames are not rendered.
         depth: metres, float32, [height, width]; None if depth is not rendered.
-        objects: objects by id.
+        received: the objects, see `objects`.
         inventory: ids of the objects that the agent holds, in its hand or with its arm.
         success: True if the action was accepted.
         error: the simulator's message if the action was refused.
         error_code: the simulator's code of this error.
         result: `actionReturn`.
-        instances: objects in the frame by id; None if instance segmentation is not rendered.
-        segmentation: which object each pixel shows; None likewise.
+        segmentation: which object each pixel shows; None if that is not rendered.
         arm: arm of the agent; None if it has none.
         camera: the agent's; None where a simulator does not report it.
         third_party: frames of the third-party cameras, like `frame`, by their ids.
@@ -201,7 +220,7 @@ class SimulatorView:
 
     frame: NDArray[np.uint8] | None
     depth: NDArray[np.float32] | None
-    objects: dict[str, ThorObject]
+    received: dict[str, ThorObject] | PackedObjects
     agent: AgentPose
     inventory: tuple[str, ...]
     success: bool
@@ -209,12 +228,22 @@ class SimulatorView:
     error_code: str
     result: Any
     scene: str
-    instances: dict[str, Instance] | None
     segmentation: Segmentation | None = None
     arm: ArmState | None = None
     camera: Camera | None = None
     third_party: Sequence[NDArray[np.uint8]] = ()
     image_digest: str | None = None
+
+    @property
+    def objects(self) -> dict[str, ThorObject]:
+        """The objects by id; raises SimulatorError if a simulator's are malformed."""
+        received = self.received
+        return received.by_id if isinstance(received, PackedObjects) else received
+
+    @property
+    def instances(self) -> dict[str, Instance] | None:
+        """Objects in the frame by id; None if instance segmentation is not rendered."""
+        return None if self.segmentation is None else self.segmentation.instances
 
 
 class _InHand(msgspec.Struct):
@@ -250,16 +279,13 @@ def view_of(event: Any) -> SimulatorView:
         ]
         outcome = msgspec.convert(metadata, _Outcome)
     except (ValueError, KeyError, TypeError) as error:  # msgspec's errors are ValueErrors
-        raise SimulatorError(
-            f"metadata of {metadata.get('lastAction')!r:.40}: {in_one_line(error)}; use AI2-THOR "
-            "5.x"
-        ) from error
-    segmentation = segmentation_of(event)
+        raise _malformed(f"metadata of {metadata.get('lastAction')!r:.40}", error) from error
+    shown = event.instance_segmentation_frame
     return SimulatorView(
         frame=None if event.frame is None else np.ascontiguousarray(event.frame),
         third_party=[np.ascontiguousarray(frame) for frame in event.third_party_camera_frames],
         depth=None if event.depth_frame is None else np.ascontiguousarray(event.depth_frame),
-        objects={obj.object_id: obj for obj in objects},
+        received=objects,
         agent=agent,
         inventory=tuple(in_hand if arm is None else arm.held),
         success=outcome.success,
@@ -267,12 +293,15 @@ def view_of(event: Any) -> SimulatorView:
         error_code=str(outcome.code or ""),
         result=outcome.result,
         scene=outcome.scene,
-        instances=None if segmentation is None else segmentation.instances(),
-        segmentation=segmentation,
+        segmentation=None if shown is None else Segmentation(shown, event.color_to_object_id),
         arm=arm,
         camera=camera,
         image_digest=metadata.get("imageDigest"),
     )
+
+
+def _malformed(what: str, error: Exception) -> SimulatorError:
+    return SimulatorError(f"{what}: {in_one_line(error)}; use AI2-THOR 5.x")
 
 
 def _camera(metadata: dict[str, Any], agent: AgentPose) -> Camera | None:

@@ -1,5 +1,6 @@
 """Pictures of one world: the agent's view, the client's frame, third-party cameras."""
 
+from collections.abc import Iterator, Set
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -187,7 +188,8 @@ class _Coloured:
 class _SceneModel:
     """The primitives of one world: the rooms' shell and objects' shapes.
 
-    Each object's rows are kept until its version changes.
+    Each object's rows are kept until its version changes, and those of all that the hand does not
+    hold as long as it alone moves.
     """
 
     def __init__(self, world: World) -> None:
@@ -195,6 +197,7 @@ class _SceneModel:
         self._rows: dict[str, tuple[int, int, Array]] = {}
         self._shell = shell_rows(world)
         self._state: tuple[object, ...] = ()
+        self._state_around: tuple[object, ...] = ()
         self._all: Array = np.zeros((0, COLUMNS))
         self._names: tuple[str, ...] = ()
         self._held: Array = np.zeros((0, COLUMNS))
@@ -202,16 +205,17 @@ class _SceneModel:
     def show(self, world: World) -> None:
         """Take another state of the same scene; no two have objects of one id and version."""
         self._world = world
-        self._version = -1
+        self._state = self._state_around = ()
 
     def primitives(self) -> tuple[Array, Array, tuple[str, ...]]:
         """Return all primitives but the held object's (n, COLUMNS), its own, instances' names.
 
         The held object is the active agent's.
         """
-        state = (self._world.version, bodies_state(self._world))
+        world = self._world
+        state = (world.version, bodies_state(world))
         if self._state != state:
-            self._rebuild()
+            self._rebuild((world.version_around, world.agent.held, bodies_state(world)))
             self._state = state
         return self._all, self._held, self._names
 
@@ -236,30 +240,33 @@ class _SceneModel:
         daylight = (_DARK if dark else 1.0) * self._world.appearance.brightness
         return Lights(np.array(lamps).reshape(-1, 4), daylight)
 
-    def _rebuild(self) -> None:
+    def _rebuild(self, around: tuple[object, ...]) -> None:
         world = self._world
-        names = [*SHELL_NAMES, *world.objects]
-        parts = [self._shell]
-        held = [np.zeros((0, COLUMNS))]
+        names = (*SHELL_NAMES, *world.objects)
+        if len(world.agents) > 1:
+            names = (*names, BODY)
         # What the hand holds is drawn apart: it hides nothing from the agent's sight, and the frame
         # shows it smaller.
         in_hand = set()
         if world.agent.held is not None:
             item = world.objects[world.agent.held]
             in_hand = {o.object_id for o in (item, *world.descendants(item))}
-        for index, item in enumerate(world.objects.values(), start=len(SHELL_NAMES)):
+        if self._state_around != around:
+            self._rows = {key: value for key, value in self._rows.items() if key in world.objects}
+            parts = [self._shell, *self._shown_rows(world.objects.keys() - in_hand)]
+            if BODY in names:
+                parts += [body_rows(a, i, len(names) - 1) for i, a in world.others() if a.drawn]
+            self._all = apply_finishes(np.concatenate(parts), names, world.appearance)
+            self._state_around = around
+        held = [np.zeros((0, COLUMNS)), *self._shown_rows(in_hand)]
+        self._held = apply_finishes(np.concatenate(held), names, world.appearance)
+        self._names = names
+
+    def _shown_rows(self, ids: Set[str]) -> Iterator[Array]:
+        for index, item in enumerate(self._world.objects.values(), start=len(SHELL_NAMES)):
             # nobody sees into a closed fridge, so its contents need not be drawn
-            if world.is_hidden(item):
-                continue
-            (held if item.object_id in in_hand else parts).append(self._object_rows(item, index))
-        if len(world.agents) > 1:
-            names.append(BODY)
-            parts += [body_rows(a, i, len(names) - 1) for i, a in world.others() if a.drawn]
-        self._rows = {key: value for key, value in self._rows.items() if key in world.objects}
-        look = world.appearance
-        self._all = apply_finishes(np.concatenate(parts), names, look)
-        self._held = apply_finishes(np.concatenate(held), names, look)
-        self._names = tuple(names)
+            if item.object_id in ids and not self._world.is_hidden(item):
+                yield self._object_rows(item, index)
 
     def _object_rows(self, item: SimObject, index: int) -> Array:
         entry = self._rows.get(item.object_id)

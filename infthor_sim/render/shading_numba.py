@@ -72,36 +72,46 @@ def eye_of(camera: PinholeCamera) -> tuple[float, ...]:
 
 
 @njit(cache=True, error_model="numpy")
-def _lamp_light(
+def _add_lamps(
     table: Array,
     first: int,
     k: int,
-    nx: float,
-    ny: float,
-    nz: float,
-    u: float,
-    v: float,
-    t: float,
     eye: Any,
-) -> float:
-    """Return the lamps' light at depth t on the ray (u, v), on a surface of unit normal n.
+    us: Array,
+    vs: Array,
+    ts: Array,
+    nx: Array,
+    ny: Array,
+    nz: Array,
+    light: Array,
+    lamps: Array,
+) -> None:
+    """Add the lamps' light where rays hit primitive `k`, on surfaces of unit normals n.
 
-    The normal is given along the axes of primitive `k`; the lamps are the table's rows from `first`
-    on.
+    The normals are given along the axes of the primitive; the lamps are the table's rows from
+    `first` on. Their light is summed in `lamps` before it is added.
     """
-    mx = table[k, AXES] * nx + table[k, AXES + 3] * ny + table[k, AXES + 6] * nz
-    my = table[k, AXES + 1] * nx + table[k, AXES + 4] * ny + table[k, AXES + 7] * nz
-    mz = table[k, AXES + 2] * nx + table[k, AXES + 5] * ny + table[k, AXES + 8] * nz
-    x = eye[0] + t * ((eye[3] + u * eye[6]) + v * eye[9])
-    y = eye[1] + t * ((eye[4] + u * eye[7]) + v * eye[10])
-    z = eye[2] + t * ((eye[5] + u * eye[8]) + v * eye[11])
-    light = 0.0
+    # One lamp after the other, so that the compiler computes several rays at once.
+    ax, ay, az = table[k, AXES], table[k, AXES + 1], table[k, AXES + 2]
+    bx, by, bz = table[k, AXES + 3], table[k, AXES + 4], table[k, AXES + 5]
+    cx, cy, cz = table[k, AXES + 6], table[k, AXES + 7], table[k, AXES + 8]
+    lamps[:] = 0.0
     for i in range(first, len(table)):
-        lx, ly, lz = table[i, 0] - x, table[i, 1] - y, table[i, 2] - z
-        square = lx * lx + ly * ly + lz * lz
-        cosine = (mx * lx + my * ly + mz * lz) / (math.sqrt(square) + 1e-6)
-        light = light + table[i, 3] * max(cosine, 0.0) * (LAMP_REACH / (LAMP_REACH + square))
-    return light
+        lamp_x, lamp_y, lamp_z, strength = table[i, 0], table[i, 1], table[i, 2], table[i, 3]
+        for j in range(len(us)):
+            u, v, t = us[j], vs[j], ts[j]
+            mx = ax * nx[j] + bx * ny[j] + cx * nz[j]
+            my = ay * nx[j] + by * ny[j] + cy * nz[j]
+            mz = az * nx[j] + bz * ny[j] + cz * nz[j]
+            lx = lamp_x - (eye[0] + t * ((eye[3] + u * eye[6]) + v * eye[9]))
+            ly = lamp_y - (eye[1] + t * ((eye[4] + u * eye[7]) + v * eye[10]))
+            lz = lamp_z - (eye[2] + t * ((eye[5] + u * eye[8]) + v * eye[11]))
+            square = lx * lx + ly * ly + lz * lz
+            cosine = (mx * lx + my * ly + mz * lz) / (math.sqrt(square) + 1e-6)
+            reach = LAMP_REACH / (LAMP_REACH + square)
+            lamps[j] = lamps[j] + strength * max(cosine, 0.0) * reach
+    for j in range(len(us)):
+        light[j] = light[j] + lamps[j]
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -137,7 +147,7 @@ def brightness(
         us, vs, depths: the rays, and the depth at which they hit (n,).
     """
     starts, members = group(orders, first)
-    work = np.empty((9, len(orders)))
+    work = np.empty((10, len(orders)))
     # taken one by one, as numba does not know of unpacked rows that they are contiguous
     u = work[0]
     v = work[1]
@@ -148,6 +158,7 @@ def brightness(
     nx = work[6]
     ny = work[7]
     nz = work[8]
+    lamps = work[9]
     for j in range(len(members)):
         i = members[j]
         u[j] = us[i]
@@ -169,10 +180,10 @@ def brightness(
                 a[start:end], b[start:end], nx[start:end], ny[start:end], nz[start:end],
             )  # fmt: skip
         if first < len(table):
-            for j in range(start, end):
-                light[j] = light[j] + _lamp_light(
-                    table, first, k, nx[j], ny[j], nz[j], u[j], v[j], t[j], eye
-                )
+            _add_lamps(
+                table, first, k, eye, u[start:end], v[start:end], t[start:end], nx[start:end],
+                ny[start:end], nz[start:end], light[start:end], lamps[start:end],
+            )  # fmt: skip
         _apply_pattern(table[k, MATERIAL], a[start:end], b[start:end], light[start:end])
         glow = table[k, EMISSION]
         for j in range(start, end):

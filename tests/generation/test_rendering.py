@@ -47,9 +47,7 @@ class ScriptedSimulator:
         objects = {obj.object_id: obj for obj in (*self._objects, *seen)}
         frame = np.full((8, 8, 3), SHADES[picture], np.uint8)
         error = "" if success else "refused"
-        return SimulatorView(
-            frame, None, objects, pose, (), success, error, "", None, "scripted", None
-        )
+        return SimulatorView(frame, None, objects, pose, (), success, error, "", None, "scripted")
 
     def reset(self, scene: str) -> SimulatorView:
         return self.view

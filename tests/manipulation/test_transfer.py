@@ -121,7 +121,7 @@ def test_states_are_set_either_way(drawers):
         if item.object_type == "Drawer":
             changes |= {"openness": 0.5, "is_open": True}
         changed[key] = msgspec.structs.replace(item, **changes)
-    wanted = replace(view, objects=changed)
+    wanted = replace(view, received=changed)
 
     def states(view):
         return {
@@ -147,7 +147,7 @@ def test_what_is_missing_is_named(drawers):
     view = drawers.simulator.rewind(start, exactly=True)
     fork = view.objects[FORK]
     unknown = msgspec.structs.replace(fork, object_id="Elephant|+01.00|+00.00|+02.00")
-    wanted = replace(view, objects=view.objects | {unknown.object_id: unknown})
+    wanted = replace(view, received=view.objects | {unknown.object_id: unknown})
     assert transfer(drawers.simulator, wanted) == [unknown.object_id]
     drawers.simulator.step("RemoveFromScene", objectId=fork.object_id)
     assert transfer(drawers.simulator, wanted) == sorted([unknown.object_id, fork.object_id])
@@ -159,7 +159,7 @@ def test_an_episode_whose_things_are_missing_counts_for_nobody(drawers):
     unknown = msgspec.structs.replace(
         start.view.objects[start.object_id], object_id="Elephant|+01.00|+00.00|+02.00"
     )
-    view = replace(start.view, objects=start.view.objects | {unknown.object_id: unknown})
+    view = replace(start.view, received=start.view.objects | {unknown.object_id: unknown})
     for changes in ({"object_id": unknown.object_id}, {"receptacle_id": unknown.object_id}):
         missing = replace(start, view=view, **changes)
         real = drawers.states.starts

@@ -114,7 +114,7 @@ class Misnaming(Broken):
     def reset(self, plan=0):
         observation, info = super().reset(plan)
         objects = {key.replace("|", "_"): item for key, item in observation.view.objects.items()}
-        return replace(observation, view=replace(observation.view, objects=objects)), info
+        return replace(observation, view=replace(observation.view, received=objects)), info
 
 
 class Wrapping(Broken):

@@ -17,12 +17,12 @@ def thing(object_id, **fields):
     return ThorObject(object_id=object_id, object_type=object_type, **defaults)
 
 
-def view(*things, inventory=(), instances=None):
+def view(*things, inventory=()):
     """The world with these objects, after a successful action."""
     return SimulatorView(
         frame=None,
         depth=None,
-        objects={item.object_id: item for item in things},
+        received={item.object_id: item for item in things},
         agent=AgentPose(Vector(0, 0.9, 0), 0.0, 0.0),
         inventory=tuple(inventory),
         success=True,
@@ -30,5 +30,4 @@ def view(*things, inventory=(), instances=None):
         error_code="",
         result=None,
         scene="by-hand",
-        instances=instances,
     )

@@ -7,19 +7,15 @@ even areas, come out smaller without a filter, and in a third of the time.
 import os
 import struct
 import zlib
-from collections import deque
-from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from infthor_eval.storage.background import Background
+
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _LEVEL = 3  # 6 takes twice as long and shrinks rendered frames by a sixth
-_WAITING = 8  # frames that may wait to be written
 _RGB = (8, 2, 0, 0, 0)  # bits, colour type, compression, filter method, not interlaced
 
 
@@ -40,39 +36,20 @@ def write_png(path: Path, frame: NDArray[np.uint8], level: int) -> None:
     path.write_bytes(_SIGNATURE + b"".join(parts))
 
 
-class PngWriter:
-    """Writes frames into a folder in a thread of its own, while the next ones are drawn.
-
-    Leaving the context waits for all. An error in writing is raised by a later `write`, or there.
-    """
+class PngWriter(Background):
+    """Writes frames into a folder in a thread of its own, while the next ones are drawn."""
 
     def __init__(self, folder: Path) -> None:
+        super().__init__("png")
         self.folder = folder
-        self._thread = ThreadPoolExecutor(1, "png")
-        self._waiting: deque[Future[None]] = deque()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None
-    ) -> None:
-        self._thread.shutdown(cancel_futures=kind is not None)
-        while kind is None and self._waiting:
-            self._waiting.popleft().result()
 
     def write(self, name: str, frame: NDArray[np.uint8]) -> None:
         """Write an RGB frame [height, width, 3], which must not change any more."""
-        self._submit(write_png, self.folder / name, frame, _LEVEL)
+        self.run(write_png, self.folder / name, frame, _LEVEL)
 
     def link(self, source: Path, target: Path) -> None:
         """Give a file that this writer or an earlier one wrote a second name."""
-        self._submit(os.link, source, target)
-
-    def _submit(self, function: Callable[..., None], *arguments: Any) -> None:
-        self._waiting.append(self._thread.submit(function, *arguments))
-        if len(self._waiting) > _WAITING:
-            self._waiting.popleft().result()
+        self.run(os.link, source, target)
 
 
 def _chunk(name: bytes, content: bytes) -> bytes:

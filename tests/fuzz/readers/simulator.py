@@ -163,7 +163,7 @@ def _view(folder: Path) -> None:
             depth_frame=None,
             instance_segmentation_frame=None,
         )
-        view_of(event)
+        view_of(event).objects  # noqa: B018
 
 
 READERS = (

@@ -25,7 +25,7 @@ def as_at_start(episode, is_open):
         key: replace_fields(obj, is_open=is_open(obj)) if obj.openable else obj
         for key, obj in episode.start.objects.items()
     }
-    return replace(episode, start=replace(episode.start, objects=objects))
+    return replace(episode, start=replace(episode.start, received=objects))
 
 
 @pytest.mark.parametrize(

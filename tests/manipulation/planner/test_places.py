@@ -48,7 +48,7 @@ def thing(name, x, y, z, size=(0.1, 0.1, 0.1), **more):
 def view_of(*things):
     agent = AgentPose(Vector(0.0, 0.9, -1.0), 0.0, 0.0)
     return SimulatorView(
-        None, None, {t.object_id: t for t in things}, agent, (), True, "", "", None, "a", None
+        None, None, {t.object_id: t for t in things}, agent, (), True, "", "", None, "a"
     )
 
 

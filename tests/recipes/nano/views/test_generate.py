@@ -109,7 +109,9 @@ def test_pixels_of_cells_are_those_of_the_named_codes_in_them(codes, grid):
         for code, name in names.items()
         if code in codes
     }
-    cells = cell_pixels(Segmentation(codes, names), grid)
+    colors = {(0, 0, code): name for code, name in names.items()}
+    frame = np.stack([np.zeros_like(codes), np.zeros_like(codes), codes], axis=-1)
+    cells = cell_pixels(Segmentation(frame, colors), grid)
     assert {name: counts.tolist() for name, counts in cells.items()} == expected
 
 
