@@ -32,6 +32,7 @@ _THIRD = (
     FieldType.THIRD_PARTY_IDS,
     FieldType.THIRD_PARTY_CLASSES,
 )
+_FLOAT = b"\xcb"  # msgpack's head of a float 64, whose eight bytes follow, the highest first
 _DYNAMIC = 3  # fields that depend on the agent: visible, isInteractable, distance
 _VISIBLE = (
     msgpack.packb("visible")
@@ -39,6 +40,7 @@ _VISIBLE = (
     + msgpack.packb("isInteractable")
     + b"\xc3"
     + msgpack.packb("distance")
+    + _FLOAT
 )
 _HIDDEN = (
     msgpack.packb("visible")
@@ -46,8 +48,8 @@ _HIDDEN = (
     + msgpack.packb("isInteractable")
     + b"\xc2"
     + msgpack.packb("distance")
+    + _FLOAT
 )
-_DOUBLE = struct.Struct(">Bd")
 
 
 class SimulatorServer:
@@ -173,8 +175,8 @@ class MetadataPacker:
     """
 
     def __init__(self) -> None:
-        # version, number of fields, their bytes, by object id
-        self._packed: dict[str, tuple[int, int, bytes]] = {}
+        # version, and the bytes of a map up to its fields that depend on the agent, by object id
+        self._packed: dict[str, tuple[int, bytes]] = {}
         self._colors: tuple[tuple[str, ...], bytes] | None = None
         self._scene = -1  # the number of the scene whose objects are packed
 
@@ -216,19 +218,16 @@ class MetadataPacker:
         reported = sim.reported_objects()
         positions: Array = np.array([o.position for o in reported]).reshape(-1, 3)
         distances = np.linalg.norm(positions - sim.world.agent.position, axis=1)
+        numbers = distances.astype(">f8").tobytes()
         parts = [_array_head(len(reported))]
-        for item, distance in zip(reported, distances, strict=True):
+        for number, item in enumerate(reported):
             entry = self._packed.get(item.object_id)
             if entry is None or entry[0] != item.version:
                 fields = object_metadata(item)
-                entry = (item.version, len(fields), _entries(fields))
+                entry = item.version, _map_head(len(fields) + _DYNAMIC) + _entries(fields)
                 self._packed[item.object_id] = entry
-            parts += [
-                _map_head(entry[1] + _DYNAMIC),
-                entry[2],
-                _VISIBLE if item.object_id in visible else _HIDDEN,
-            ]
-            parts.append(_DOUBLE.pack(0xCB, distance))  # 0xCB: msgpack's float 64
+            seen = _VISIBLE if item.object_id in visible else _HIDDEN
+            parts += (entry[1], seen, numbers[8 * number : 8 * number + 8])
         return parts
 
     def _color_list(self, sim: Simulation) -> bytes:
