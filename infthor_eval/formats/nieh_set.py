@@ -36,6 +36,7 @@ from infthor_eval.formats.set_info import simulator_of
 from infthor_eval.formats.shared_frames import read_shared_frames
 from infthor_eval.formats.step_log import Step, log_file, read_steps
 from infthor_eval.formats.twins import TwinPair, has_pairs, read_pairs
+from infthor_eval.grouping import grouped
 
 T = TypeVar("T")
 K = TypeVar("K")
@@ -486,7 +487,5 @@ def _logged_action_frames(steps: Sequence[Step]) -> dict[int, tuple[int, ...]] |
 
 def _by_action(frames: Iterable[tuple[int, int]]) -> dict[int, tuple[int, ...]]:
     """Return frames by their actions, in the order of these."""
-    positions: dict[int, list[int]] = {}
-    for action, position in frames:
-        positions.setdefault(action, []).append(position)
+    positions = grouped(frames)
     return {action: tuple(positions[action]) for action in sorted(positions)}

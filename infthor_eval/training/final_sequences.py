@@ -20,6 +20,7 @@ from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.trajectory import Trajectory
+from infthor_eval.grouping import grouped
 from infthor_eval.household.sequence_text import ACT, action_part, action_text, task_goal_part
 from infthor_eval.plans.history.segments import Part, PlanSegment
 from infthor_eval.plans.plan import tasks_of
@@ -150,9 +151,7 @@ def _before(action: int, memory: _State | _Retrieved) -> Sequence[Part]:
 
 def _by_action(images: Sequence[_Image]) -> Mapping[int, Sequence[str]]:
     """Return the first and the last frame of each action, or the one that it has."""
-    names_by_action: dict[int, list[str]] = {}
-    for image in images:
-        names_by_action.setdefault(image.low_idx, []).append(image.image_name)
+    names_by_action = grouped((image.low_idx, image.image_name) for image in images)
     return {
         action: names if len(names) == 1 else [names[0], names[-1]]
         for action, names in names_by_action.items()
