@@ -11,7 +11,7 @@ the reply.
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Literal
 
 import msgspec
 
@@ -22,6 +22,7 @@ from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.grouping import grouped
 from infthor_eval.household.sequence_text import ACT, action_part, action_text, task_goal_part
+from infthor_eval.plans.history.retrieved import NamedImage, images_of
 from infthor_eval.plans.history.segments import Part, PlanSegment
 from infthor_eval.plans.plan import tasks_of
 from infthor_eval.plans.published.system_prompts import system_prompt
@@ -35,11 +36,6 @@ _FEWER = 9
 
 class _Entry(msgspec.Struct):
     top20: list[str]
-
-
-class _Image(msgspec.Struct):
-    low_idx: Annotated[int, msgspec.Meta(ge=0)]
-    image_name: str
 
 
 def memory_sequences(
@@ -102,27 +98,17 @@ class _Retrieved:
     """The retrieved frames; if none, each earlier action's first and last frame."""
 
     def __init__(self, data: NiehSet, trajectory: Trajectory) -> None:
-        location = f"trajectory {trajectory.traj_id}"
-        hint = "restore the file"
         if not trajectory.retrieved_image:
             raise DataError(
                 "the trajectory has no retrieved_image, which actions of the form frames need"
             )
-        with wrap_errors(
-            f"{location}: retrieved_image is no list {_NAMES} for each action",
-            hint,
-            catch=msgspec.ValidationError,
-        ):
+        problem = f"retrieved_image is no list {_NAMES} for each action"
+        where = f"trajectory {trajectory.traj_id}: {problem}"
+        with wrap_errors(where, "restore the file", catch=msgspec.ValidationError):
             self._retrieved = msgspec.convert(
                 trajectory.retrieved_image, dict[int, _Entry], strict=False
             )
-        with wrap_errors(
-            f"{location}: images is no list of low_idx and image_name",
-            hint,
-            catch=msgspec.ValidationError,
-        ):
-            images = msgspec.convert(trajectory.images, list[_Image])
-        self._of_actions = _by_action(images)
+        self._of_actions = _by_action(images_of(trajectory))
         self._frames = {Path(frame.name).stem: frame for frame in data.frames(trajectory.traj_id)}
 
     @property
@@ -149,7 +135,7 @@ def _before(action: int, memory: _State | _Retrieved) -> Sequence[Part]:
     return memory.parts(action) if action else ["Initial state: "]
 
 
-def _by_action(images: Sequence[_Image]) -> Mapping[int, Sequence[str]]:
+def _by_action(images: Sequence[NamedImage]) -> Mapping[int, Sequence[str]]:
     """Return the first and the last frame of each action, or the one that it has."""
     names_by_action = grouped((image.low_idx, image.image_name) for image in images)
     return {
