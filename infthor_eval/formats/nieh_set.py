@@ -147,6 +147,11 @@ class NiehSet:
         return tuple(row for row in self.rows if isinstance(row, Question))
 
     @cached_property
+    def by_id(self) -> Mapping[str, Question]:
+        """The questions that can be asked, by their ids."""
+        return {question.id: question for question in self.questions}
+
+    @cached_property
     def twins(self) -> Mapping[str, TwinPair]:
         """Pairs of worlds by the names of both trajectories; none of a set of pairs of moments.
 
@@ -182,18 +187,15 @@ class NiehSet:
     def _read_file(self, file: Path) -> tuple[Question | SkippedQuestion, ...]:
         name = file.stem if len(self.question_files) > 1 else ""
         rows = read_questions(file) if self._own is None else self._own.read_questions()
-        are_twins = has_pairs(self.directory) or _have_worlds(rows)
-        bases = self._bases if are_twins and _have_pairs(rows) else {}
+        bases: Mapping[str, str] = {}
+        if _have_pairs(rows) and (has_pairs(self.directory) or _have_worlds(rows)):
+            bases = {name: pair.base for name, pair in self._worlds.items()}
         return tuple(
             row
             if isinstance(row, SkippedQuestion)
             else replace(row, file=name, base=bases.get(row.traj_id, ""))
             for row in rows
         )
-
-    @cached_property
-    def _bases(self) -> Mapping[str, str]:
-        return {name: pair.base for name, pair in self._worlds.items()}
 
     def reasons(self) -> Counter[str]:
         """Return the number of skipped questions by reason."""
