@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from infthor_eval.nieh.guessing.audit import Audit, Group
 from infthor_eval.nieh.guessing.balancing import MARGIN, Balanced
 from infthor_eval.nieh.results.above_blind import FormScore
+from infthor_eval.nieh.results.cells import percent
 from infthor_eval.nieh.results.summary import NiehSummary, main_metric
 from infthor_eval.runs import RunSummary
 from infthor_eval.tables import Column, Row, Table
@@ -69,17 +70,13 @@ def _cells(group: Group) -> tuple[str, ...]:
         str(len(group.questions)),
         str(len(group.answers)),
         f"{group.entropy:.2f}",
-        _percent(group.share_yes),
-        _percent(group.chance),
-        _percent(group.best_without_scene()),
-        _percent(group.means()[-1]),
-        _percent(mean),
+        percent(group.share_yes),
+        percent(group.chance),
+        percent(group.best_without_scene()),
+        percent(group.means()[-1]),
+        percent(mean),
         name,
     )
-
-
-def _percent(share: float | None) -> str:
-    return "-" if share is None else f"{100 * share:.1f}"
 
 
 def runs_table(runs: Sequence[RunSummary]) -> Table:
