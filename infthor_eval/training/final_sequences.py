@@ -65,7 +65,8 @@ def memory_sequences(
             yield SkippedSequence(name, "belongs to no task")
             continue
         try:
-            before = _before(action, memory)
+            # The first action has no memory.
+            before = memory.parts(action) if action else ["Initial state: "]
         except DataError as error:
             yield SkippedSequence(name, str(error))
             continue
@@ -128,11 +129,6 @@ class _Retrieved:
         if frame is None:
             raise DataError(f"its retrieved frame {name!r:.60} is not in the set")
         return frame
-
-
-def _before(action: int, memory: _State | _Retrieved) -> Sequence[Part]:
-    """Return what stands between the goal and the current frame; the first action has no memory."""
-    return memory.parts(action) if action else ["Initial state: "]
 
 
 def _by_action(images: Sequence[NamedImage]) -> Mapping[int, Sequence[str]]:
@@ -222,17 +218,13 @@ def goals_of_actions(
             yield window.parts
             window = _Window([goal, last], 1 + frame_tokens)
         window.add(plan, n_tokens)
-        last = _last_frame(window.parts)
+        last = next(part for part in reversed(window.parts) if isinstance(part, FrameRef))
     yield window.parts
 
 
 def _most_actions(limit: int, frame_tokens: int) -> int:
     """Return how many actions of one plan stay below the limit."""
     return (limit - 1) // (1 + frame_tokens)
-
-
-def _last_frame(parts: Sequence[Part]) -> FrameRef:
-    return next(part for part in reversed(parts) if isinstance(part, FrameRef))
 
 
 def _texts(parts: Sequence[Part]) -> Iterator[str]:
