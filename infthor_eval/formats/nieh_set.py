@@ -231,14 +231,9 @@ class NiehSet:
     def find_places(self, traj_id: str, frames: Sequence[FrameRef]) -> list[int]:
         """Return where in a trajectory's time order frames in time order are; none where one of
         them is no frame of it."""
-
-        def read() -> dict[FrameRef, list[int]]:
-            by_frame: dict[FrameRef, list[int]] = {}
-            for place, frame in enumerate(self.frames(traj_id)):
-                by_frame.setdefault(frame, []).append(place)  # some pictures are there twice
-            return by_frame
-
-        by_frame = _read_once(self._places, traj_id, read)
+        # Some pictures are there twice.
+        numbered = ((frame, place) for place, frame in enumerate(self.frames(traj_id)))
+        by_frame = _read_once(self._places, traj_id, lambda: grouped(numbered))
         found: list[int] = []
         for frame in frames:
             places = by_frame.get(frame)
