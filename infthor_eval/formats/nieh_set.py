@@ -36,6 +36,7 @@ from infthor_eval.formats.set_info import simulator_of
 from infthor_eval.formats.shared_frames import read_shared_frames
 from infthor_eval.formats.step_log import Step, log_file, read_steps
 from infthor_eval.formats.twins import TwinPair, has_pairs, read_pairs
+from infthor_eval.grouping import grouped
 
 T = TypeVar("T")
 K = TypeVar("K")
@@ -146,6 +147,11 @@ class NiehSet:
         return tuple(row for row in self.rows if isinstance(row, Question))
 
     @cached_property
+    def by_id(self) -> Mapping[str, Question]:
+        """The questions that can be asked, by their ids."""
+        return {question.id: question for question in self.questions}
+
+    @cached_property
     def twins(self) -> Mapping[str, TwinPair]:
         """Pairs of worlds by the names of both trajectories; none of a set of pairs of moments.
 
@@ -181,18 +187,15 @@ class NiehSet:
     def _read_file(self, file: Path) -> tuple[Question | SkippedQuestion, ...]:
         name = file.stem if len(self.question_files) > 1 else ""
         rows = read_questions(file) if self._own is None else self._own.read_questions()
-        are_twins = has_pairs(self.directory) or _have_worlds(rows)
-        bases = self._bases if are_twins and _have_pairs(rows) else {}
+        bases: Mapping[str, str] = {}
+        if _have_pairs(rows) and (has_pairs(self.directory) or _have_worlds(rows)):
+            bases = {name: pair.base for name, pair in self._worlds.items()}
         return tuple(
             row
             if isinstance(row, SkippedQuestion)
             else replace(row, file=name, base=bases.get(row.traj_id, ""))
             for row in rows
         )
-
-    @cached_property
-    def _bases(self) -> Mapping[str, str]:
-        return {name: pair.base for name, pair in self._worlds.items()}
 
     def reasons(self) -> Counter[str]:
         """Return the number of skipped questions by reason."""
@@ -228,14 +231,9 @@ class NiehSet:
     def find_places(self, traj_id: str, frames: Sequence[FrameRef]) -> list[int]:
         """Return where in a trajectory's time order frames in time order are; none where one of
         them is no frame of it."""
-
-        def read() -> dict[FrameRef, list[int]]:
-            by_frame: dict[FrameRef, list[int]] = {}
-            for place, frame in enumerate(self.frames(traj_id)):
-                by_frame.setdefault(frame, []).append(place)  # some pictures are there twice
-            return by_frame
-
-        by_frame = _read_once(self._places, traj_id, read)
+        # Some pictures are there twice.
+        numbered = ((frame, place) for place, frame in enumerate(self.frames(traj_id)))
+        by_frame = _read_once(self._places, traj_id, lambda: grouped(numbered))
         found: list[int] = []
         for frame in frames:
             places = by_frame.get(frame)
@@ -486,7 +484,5 @@ def _logged_action_frames(steps: Sequence[Step]) -> dict[int, tuple[int, ...]] |
 
 def _by_action(frames: Iterable[tuple[int, int]]) -> dict[int, tuple[int, ...]]:
     """Return frames by their actions, in the order of these."""
-    positions: dict[int, list[int]] = {}
-    for action, position in frames:
-        positions.setdefault(action, []).append(position)
+    positions = grouped(frames)
     return {action: tuple(positions[action]) for action in sorted(positions)}

@@ -225,6 +225,14 @@ class Trajectory(_Fields):
     twin: TwinWorld | None = None
     arm_choices: list[ArmChoice] = msgspec.field(default_factory=list)
 
+    @property
+    def tasks(self) -> list[SubTask]:
+        """The tasks of its parts; some files have the final one apart from the others."""
+        final = self.long_horizon_task
+        if final is not None and len(self.sub_trajs) == len(self.sub_tasks) + 1:
+            return [*self.sub_tasks, final]
+        return list(self.sub_tasks)
+
 
 @dataclass(frozen=True)
 class TrajectorySource:

@@ -39,6 +39,7 @@ from infthor_eval.generation.settings import TrajectorySettings
 from infthor_eval.generation.twins.drafting import TwinSettings
 from infthor_eval.generation.twins.twin_set import DraftTwins, TwinSummary, make_twins
 from infthor_eval.generation.twins.undrawn import copy_questions, pack_worlds
+from infthor_eval.grouping import grouped
 from infthor_eval.storage.digests import digest_of_file, digest_of_files, fingerprint
 from infthor_eval.storage.files import remove, write_atomically
 from infthor_eval.thor.launch import embedded_launch
@@ -296,12 +297,9 @@ def copy_compactly(source: Path, out: Path, colors: int) -> None:
         colors: number of colours of the pictures of one base trajectory.
     """
     data = NiehSet(source)
-    by_base: dict[str, list[TwinPair]] = {}
     pairs = read_pairs(source)
-    for pair in pairs:
-        by_base.setdefault(pair.base, []).append(pair)
     names: dict[str, Sequence[str]] = {}
-    for group in by_base.values():
+    for group in grouped((pair.base, pair) for pair in pairs).values():
         names.update(_copy_worlds(data, group, out, colors))
     write_pairs(out, [_compared(pair, names) for pair in pairs])
     copy_questions(source, out, data.files)

@@ -31,6 +31,7 @@ from infthor_eval.generation.questions.recency import (
     recent,
 )
 from infthor_eval.generation.twins.pairing import AskedWorld, ScoreReply
+from infthor_eval.grouping import grouped
 from infthor_eval.storage.digests import digest
 
 
@@ -250,15 +251,13 @@ def ladders(known: KnownEvents, rungs: Sequence[int]) -> list[Ladder]:
 
 def mirrors(found: Iterable[Ladder], score: ScoreReply) -> Iterator[Mirror]:
     """Yield all that could be chosen of a trajectory's ladders."""
-    by_text: dict[str, list[Ladder]] = {}
-    for ladder in sorted(found, key=lambda ladder: ladder.evidence):
-        by_text.setdefault(ladder.candidate.text, []).append(ladder)
-    for group in by_text.values():
-        couples: dict[frozenset[str], list[Couple]] = {}
-        for couple in combinations(group, 2):
-            if _differ(*couple, score):
-                answers = frozenset(ladder.reply for ladder in couple)
-                couples.setdefault(answers, []).append(couple)
+    in_order = sorted(found, key=lambda ladder: ladder.evidence)
+    for group in grouped((ladder.candidate.text, ladder) for ladder in in_order).values():
+        couples = grouped(
+            (frozenset((one.reply, other.reply)), (one, other))
+            for one, other in combinations(group, 2)
+            if _differ(one, other, score)
+        )
         for those in couples.values():
             # Both in the order of time: the first of each couple is the earlier one.
             for early, late in combinations(those, 2):

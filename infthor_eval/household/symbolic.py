@@ -10,6 +10,7 @@ from collections.abc import Container, Iterable
 from dataclasses import dataclass
 from functools import cached_property
 
+from infthor_eval.grouping import grouped
 from infthor_eval.household.affordances import SLICEABLE, goes_into
 from infthor_eval.household.containment import direct_parent
 from infthor_eval.thor.view import SimulatorView, ThorObject
@@ -72,10 +73,7 @@ class SymbolicRoom:
     @cached_property
     def items(self) -> dict[str, list[str]]:
         """Ids of the items by their type."""
-        listed: dict[str, list[str]] = {}
-        for item, _ in self.start.where:
-            listed.setdefault(self.types[item], []).append(item)
-        return listed
+        return grouped((self.types[item], item) for item, _ in self.start.where)
 
     def place_of(self, item: str, where: dict[str, str]) -> str | None:
         """Return where an item or receptacle can be reached, or None if it is held or absent."""

@@ -2,45 +2,24 @@
 
 import random
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from collections.abc import Sequence
+from typing import ClassVar
 
-from infthor_eval.memory.protocol import (
-    MemoryCapabilities,
-    Observation,
-    Query,
-    Recalled,
-    TrajectoryFacts,
-)
+from infthor_eval.memory.protocol import MemoryCapabilities, Query, Recalled
+from infthor_eval.memory.steps import StepMemory
 
 PUBLISHED_K = 10  # frames that the published retrieval shows
 
 
-class FrameMemory(ABC):
+class FrameMemory(StepMemory, ABC):
     """Base of memories that keep all frames and choose some; a class says which."""
-
-    capabilities: ClassVar[MemoryCapabilities] = MemoryCapabilities()
 
     def __init__(self, k: int = PUBLISHED_K) -> None:
         """Set the number of frames to recall where there is no budget of tokens."""
         if k < 1:
             raise ValueError(f"k is {k}; it is a number of frames from 1")
+        super().__init__()
         self._k = k
-        self.facts = TrajectoryFacts(name="")
-        self.past: list[Observation] = []
-
-    def identity(self) -> Mapping[str, Any]:
-        """See `Memory`."""
-        return {}
-
-    def begin(self, facts: TrajectoryFacts) -> None:
-        """See `Memory`."""
-        self.facts = facts
-        self.past = []
-
-    def observe(self, observation: Observation) -> None:
-        """See `Memory`."""
-        self.past.append(observation)
 
     def recall(self, query: Query, budget: int | None) -> Recalled:
         """See `Memory`; in time order."""

@@ -1,8 +1,8 @@
 """Memories that recall texts: an exact observer's log, and the model's own notes."""
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, ClassVar
+from collections.abc import Iterator, Sequence
+from typing import ClassVar
 
 from infthor_eval.formats.step_log import ObjectLog, ObjectState, Step
 from infthor_eval.memory.protocol import (
@@ -11,34 +11,11 @@ from infthor_eval.memory.protocol import (
     Observation,
     Query,
     Recalled,
-    TrajectoryFacts,
 )
+from infthor_eval.memory.steps import StepMemory
 
 
-class _Texts:
-    """Base of memories of texts: they keep all steps."""
-
-    capabilities: ClassVar[MemoryCapabilities]
-
-    def __init__(self) -> None:
-        self.facts = TrajectoryFacts(name="")
-        self.past: list[Observation] = []
-
-    def identity(self) -> Mapping[str, Any]:
-        """See `Memory`."""
-        return {}
-
-    def begin(self, facts: TrajectoryFacts) -> None:
-        """See `Memory`."""
-        self.facts = facts
-        self.past = []
-
-    def observe(self, observation: Observation) -> None:
-        """See `Memory`."""
-        self.past.append(observation)
-
-
-class TextLog(_Texts):
+class TextLog(StepMemory):
     """An exact observer's log: each goal and action, and objects seen, from the metadata.
 
     A line says what is new: each object that is seen first, or seen changed, with what it is in or
@@ -55,7 +32,7 @@ class TextLog(_Texts):
         return ["".join(kept)] if kept else []
 
 
-class Notes(_Texts):
+class Notes(StepMemory):
     """The model's own notes: on every window of frames it writes a short text.
 
     A note depends on the frames of its window alone. The paper reports a memory in text

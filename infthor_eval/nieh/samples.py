@@ -204,7 +204,8 @@ def _by_question(
     """
 
     def skip_unreadable(sample: QuestionVariant) -> QuestionVariant | SkippedQuestion:
-        problem = _find_problem(context.select_frames(data, sample))
+        frames = context.select_frames(data, sample)
+        problem = next(filter(None, (frame.problem for frame in frames)), None)
         return SkippedQuestion(sample.question, problem, sample.variant) if problem else sample
 
     by_position: dict[int, _Items] = {}
@@ -252,8 +253,3 @@ def _samples(
         return context.samples(data, question, settings)
     except DataError as error:  # in this trajectory's frames; questions on others can be asked
         return [SkippedQuestion(question, str(error))]
-
-
-def _find_problem(frames: list[FrameRef]) -> str | None:
-    """Return why a frame cannot be shown, or None."""
-    return next(filter(None, (frame.problem for frame in frames)), None)

@@ -11,6 +11,7 @@ from msgspec.structs import replace
 from infthor_eval.errors import DataError
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
+from infthor_eval.grouping import grouped
 from infthor_eval.nieh.contexts.base import QuestionVariant
 from infthor_eval.nieh.records import TwinSide
 from infthor_eval.nieh.samples import TaskSamples
@@ -109,7 +110,4 @@ def paired_with(data: NiehSet, question: Question) -> Question:
 
 @lru_cache(maxsize=8)
 def _by_pair(data: NiehSet) -> Mapping[str, Sequence[Question]]:
-    by_pair: dict[str, list[Question]] = {}
-    for question in data.questions:
-        by_pair.setdefault(question.pair, []).append(question)
-    return by_pair
+    return grouped((question.pair, question) for question in data.questions)

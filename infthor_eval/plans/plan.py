@@ -1,6 +1,5 @@
 """The plans of a trajectory: the instructions that an agent is given, one after the other."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -81,7 +80,11 @@ def tasks_of(trajectory: Trajectory) -> list[TrajectoryTask]:
         task = _task(trajectory, 0, single)
         return [TrajectoryTask(goal_text(trajectory, None), single.task_info, task, 0, n_high)]
     tasks = []
-    for sub_task, span in zip(_sub_tasks(trajectory), trajectory.sub_trajs, strict=True):
+    n_parts = len(trajectory.sub_trajs)
+    if n_parts != len(trajectory.tasks):
+        problem = f"{n_parts} parts for {len(trajectory.tasks)} tasks; restore the file"
+        raise _error(trajectory, problem)
+    for sub_task, span in zip(trajectory.tasks, trajectory.sub_trajs, strict=True):
         first, end = span.high_pddl_idx
         if not 0 <= first <= end <= n_high:
             problem = f"task {span.sub_traj_idx} has sub-goals {first} to {end} of {n_high}"
@@ -121,18 +124,6 @@ def plans_of(trajectory: Trajectory, words: Words) -> list[Plan]:
             )
         )
     return plans
-
-
-def _sub_tasks(trajectory: Trajectory) -> Sequence[SubTask]:
-    """Return a task for each part; some files have the final task apart from the others."""
-    tasks = trajectory.sub_tasks
-    parts = trajectory.sub_trajs
-    final = trajectory.long_horizon_task
-    if len(parts) == len(tasks) + 1 and final is not None:
-        return [*tasks, final]
-    if len(parts) != len(tasks):
-        raise _error(trajectory, f"{len(parts)} parts for {len(tasks)} tasks; restore the file")
-    return tasks
 
 
 def _task(trajectory: Trajectory, number: int, recorded: SubTask) -> Task:

@@ -18,6 +18,7 @@ from infthor_eval.episodes.summary import (
     summarise_episodes,
 )
 from infthor_eval.facets import Facet
+from infthor_eval.grouping import grouped
 from infthor_eval.plans.config import PlansConfig, PlansTaskConfig
 from infthor_eval.plans.environment import Ended
 from infthor_eval.plans.plan import PlanKind
@@ -229,11 +230,8 @@ class _Whole:
     def trajectories(self) -> dict[str, list[PlanRecord]]:
         """Plans of whole trajectories, in time order."""
         lost = {record.cluster for record in self._lost}
-        plans: dict[str, list[PlanRecord]] = {}
-        for record in self._records:
-            if record.cluster not in lost:
-                plans.setdefault(record.cluster, []).append(record.payload)
-        return plans
+        whole = (record for record in self._records if record.cluster not in lost)
+        return grouped((record.cluster, record.payload) for record in whole)
 
     def of_trajectories(self, measure: Callable[[float, float], float]) -> Rate | None:
         """Return the mean over trajectories of a measure of their reward and the highest one."""

@@ -1,14 +1,12 @@
 """Results of plans as tables: success beside the published rows, rewards, and how plans ended."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 from msgspec import UNSET
 
 from infthor_eval.episodes.tables import NAME_COLUMNS, endings_table, named_tasks, result_notes
 from infthor_eval.facets import facet_table
 from infthor_eval.formats.published import PUBLISHED_DATA, published_tables
-from infthor_eval.plans.config import PlansTaskConfig
 from infthor_eval.plans.summary import BY_DISTANCE, BY_TOKENS, FINAL_COLUMNS, PlanTaskSummary
 from infthor_eval.rates import Rate, format_number, format_percent
 from infthor_eval.runs import RunSummary
@@ -199,14 +197,11 @@ def _has_final_task(run: RunSummary) -> bool:
 def _is_comparable(run: RunSummary) -> bool:
     """Return whether a run has a task run as the published final tasks were, or from their logs."""
     comparable = any(
-        task.rewards is None or _is_published(task, task.rewards)
+        task.rewards is None
+        or (task.protocol == "published" and task.rewards.get("scoring") == "published")
         for task in run.header.config.tasks.values()
     )
     return comparable and _has_final_task(run)
-
-
-def _is_published(task: PlansTaskConfig, rewards: Mapping[str, Any]) -> bool:
-    return task.protocol == "published" and rewards.get("scoring") == "published"
 
 
 def _twin_tables(tasks: Sequence[tuple[str, str, PlanTaskSummary]]) -> list[Table]:

@@ -11,7 +11,7 @@ the reply.
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Literal
 
 import msgspec
 
@@ -20,7 +20,9 @@ from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.trajectory import Trajectory
+from infthor_eval.grouping import grouped
 from infthor_eval.household.sequence_text import ACT, action_part, action_text, task_goal_part
+from infthor_eval.plans.history.retrieved import NamedImage, images_of
 from infthor_eval.plans.history.segments import Part, PlanSegment
 from infthor_eval.plans.plan import tasks_of
 from infthor_eval.plans.published.system_prompts import system_prompt
@@ -34,11 +36,6 @@ _FEWER = 9
 
 class _Entry(msgspec.Struct):
     top20: list[str]
-
-
-class _Image(msgspec.Struct):
-    low_idx: Annotated[int, msgspec.Meta(ge=0)]
-    image_name: str
 
 
 def memory_sequences(
@@ -68,7 +65,8 @@ def memory_sequences(
             yield SkippedSequence(name, "belongs to no task")
             continue
         try:
-            before = _before(action, memory)
+            # The first action has no memory.
+            before = memory.parts(action) if action else ["Initial state: "]
         except DataError as error:
             yield SkippedSequence(name, str(error))
             continue
@@ -101,27 +99,17 @@ class _Retrieved:
     """The retrieved frames; if none, each earlier action's first and last frame."""
 
     def __init__(self, data: NiehSet, trajectory: Trajectory) -> None:
-        location = f"trajectory {trajectory.traj_id}"
-        hint = "restore the file"
         if not trajectory.retrieved_image:
             raise DataError(
                 "the trajectory has no retrieved_image, which actions of the form frames need"
             )
-        with wrap_errors(
-            f"{location}: retrieved_image is no list {_NAMES} for each action",
-            hint,
-            catch=msgspec.ValidationError,
-        ):
+        problem = f"retrieved_image is no list {_NAMES} for each action"
+        where = f"trajectory {trajectory.traj_id}: {problem}"
+        with wrap_errors(where, "restore the file", catch=msgspec.ValidationError):
             self._retrieved = msgspec.convert(
                 trajectory.retrieved_image, dict[int, _Entry], strict=False
             )
-        with wrap_errors(
-            f"{location}: images is no list of low_idx and image_name",
-            hint,
-            catch=msgspec.ValidationError,
-        ):
-            images = msgspec.convert(trajectory.images, list[_Image])
-        self._of_actions = _by_action(images)
+        self._of_actions = _by_action(images_of(trajectory))
         self._frames = {Path(frame.name).stem: frame for frame in data.frames(trajectory.traj_id)}
 
     @property
@@ -143,16 +131,9 @@ class _Retrieved:
         return frame
 
 
-def _before(action: int, memory: _State | _Retrieved) -> Sequence[Part]:
-    """Return what stands between the goal and the current frame; the first action has no memory."""
-    return memory.parts(action) if action else ["Initial state: "]
-
-
-def _by_action(images: Sequence[_Image]) -> Mapping[int, Sequence[str]]:
+def _by_action(images: Sequence[NamedImage]) -> Mapping[int, Sequence[str]]:
     """Return the first and the last frame of each action, or the one that it has."""
-    names_by_action: dict[int, list[str]] = {}
-    for image in images:
-        names_by_action.setdefault(image.low_idx, []).append(image.image_name)
+    names_by_action = grouped((image.low_idx, image.image_name) for image in images)
     return {
         action: names if len(names) == 1 else [names[0], names[-1]]
         for action, names in names_by_action.items()
@@ -237,17 +218,13 @@ def goals_of_actions(
             yield window.parts
             window = _Window([goal, last], 1 + frame_tokens)
         window.add(plan, n_tokens)
-        last = _last_frame(window.parts)
+        last = next(part for part in reversed(window.parts) if isinstance(part, FrameRef))
     yield window.parts
 
 
 def _most_actions(limit: int, frame_tokens: int) -> int:
     """Return how many actions of one plan stay below the limit."""
     return (limit - 1) // (1 + frame_tokens)
-
-
-def _last_frame(parts: Sequence[Part]) -> FrameRef:
-    return next(part for part in reversed(parts) if isinstance(part, FrameRef))
 
 
 def _texts(parts: Sequence[Part]) -> Iterator[str]:

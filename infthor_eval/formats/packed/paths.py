@@ -3,11 +3,14 @@
 import errno
 import os
 import stat
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path, PurePosixPath
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from infthor_eval.formats.packed.pack import ParquetPack
 
 ImageSize = tuple[int, int]  # width, height
 READ = ("trajectories", "steps", "frames", "files")  # by us; the others are to be looked at
@@ -15,34 +18,12 @@ REMOTE = "remote.json"  # of a set on the hub, in the folder that stands for it
 TABLES = ("questions", "frames", "steps", "trajectories", "twins", "files")
 
 
-class Pack(Protocol):
-    """What has the files of a packed set.
-
-    Attributes:
-        root: folder of its Parquet files.
-    """
-
-    root: Path
-
-    def names(self, folder: str) -> Collection[str] | None:
-        """Return the names of what is in a folder, or None if there is none of this path."""
-
-    def n_bytes(self, file: str) -> int | None:
-        """Return the size of a file, or None if there is none of this path."""
-
-    def image_size(self, file: str) -> ImageSize | None:
-        """Return the size of a frame in pixels, or None if it is no image."""
-
-    def read(self, file: str) -> bytes:
-        """Return the content of a file that is there."""
-
-
 @dataclass(frozen=True, order=True)
 class PackedPath:
     """A path in a packed set, with those of `pathlib.Path`'s methods that readers of sets need."""
 
     path: str
-    pack: Pack
+    pack: "ParquetPack"
 
     @property
     def name(self) -> str:

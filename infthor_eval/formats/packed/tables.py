@@ -11,12 +11,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Lock
-from typing import BinaryIO, Protocol
 
 import pyarrow as pa
 import pyarrow.parquet as pq
 
 from infthor_eval.errors import DataError, wrap_errors
+from infthor_eval.formats.packed.hub import HubStore
 from infthor_eval.formats.reading import file_problem
 from infthor_eval.storage.limits import FILE_MB
 
@@ -112,33 +112,12 @@ DAMAGED = (
 )
 
 
-class Store(Protocol):
-    """Where the files of a packed set are."""
-
-    @property
-    def root(self) -> Path:
-        """Folder, for messages."""
-
-    @property
-    def failures(self) -> tuple[type[Exception], ...]:
-        """What is raised where a file is damaged, or cannot be had."""
-
-    def names(self) -> Sequence[str]:
-        """Return the names of its Parquet files."""
-
-    def open(self, name: str) -> BinaryIO | str:
-        """Return a file that can be read in parts, or its path."""
-
-    def kept(self, digest: str) -> Path | None:
-        """Return where a frame is kept once it was read; None where frames are here anyway."""
-
-
 @dataclass(frozen=True)
 class LocalStore:
     """A folder of this machine."""
 
     root: Path
-    failures: tuple[type[Exception], ...] = DAMAGED
+    failures: tuple[type[Exception], ...] = DAMAGED  # raised where a file is damaged
 
     def kept(self, digest: str) -> None:
         """Return None: frames are here anyway."""
@@ -157,6 +136,9 @@ class LocalStore:
         if problem is not None:
             raise OSError(problem)
         return str(self.root / name)
+
+
+Store = LocalStore | HubStore  # where the files of a packed set are
 
 
 def shard_name(table: str, shard: int, n_shards: int) -> str:

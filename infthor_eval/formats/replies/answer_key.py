@@ -6,7 +6,6 @@ order and no answers, so ids of its questions are others, too.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 
 import msgspec
@@ -46,17 +45,13 @@ class AnswerKey:
 
     def question(self, public_id: str) -> Question:
         """Return the question, with its answers, that has this id in the public part."""
-        question = self._questions.get(self.ids.get(public_id, ""))
+        question = self.data.by_id.get(self.ids.get(public_id, ""))
         if question is None:
             raise DataError(
                 f"{self.data.root}: the key has no question {public_id!r:.80}; give the key of the "
                 "set that was asked"
             )
         return question
-
-    @cached_property
-    def _questions(self) -> Mapping[str, Question]:
-        return {question.id: question for question in self.data.questions}
 
 
 def read_key(folder: Path) -> AnswerKey:

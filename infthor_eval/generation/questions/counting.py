@@ -7,12 +7,12 @@ was opened or put, so there each clue is two frames, those without an event, too
 """
 
 import random
-from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from infthor_eval.generation.questions.candidates import Candidate, further_type
-from infthor_eval.generation.questions.history import Event, ObjectMove, TrajectoryHistory
+from infthor_eval.generation.questions.history import TrajectoryHistory
+from infthor_eval.grouping import grouped
 from infthor_eval.household.wording import in_or_on, noun, with_article, with_the
 
 QUESTION_TYPE = "movement_counting"
@@ -69,10 +69,8 @@ def _with_idle_clues(
 
 def _openings(history: TrajectoryHistory) -> Iterator[Candidate]:
     # By type: "the fridge" if there is one, "a drawer" if there are several.
-    by_type: dict[str, list[Event]] = defaultdict(list)
-    for event in history.events:
-        if event.action == "OpenObject":
-            by_type[event.object_type].append(event)
+    opened = (event for event in history.events if event.action == "OpenObject")
+    by_type = grouped((event.object_type, event) for event in opened)
     for object_type, events in sorted(by_type.items()):
         single = all(history.is_only_one(event.frame, event.target) for event in events)
         name = with_the(object_type) if single else with_article(noun(object_type))
@@ -83,9 +81,7 @@ def _openings(history: TrajectoryHistory) -> Iterator[Candidate]:
 
 def _puts(history: TrajectoryHistory) -> Iterator[Candidate]:
     # Only for receptacles that are the only ones of their types.
-    by_target: dict[str, list[ObjectMove]] = defaultdict(list)
-    for move in history.moves:
-        by_target[move.target].append(move)
+    by_target = grouped((move.target, move) for move in history.moves)
     for target, moves in sorted(by_target.items()):
         if all(history.is_only_one(move.after, target) for move in moves):
             place_type = history.target_type(moves[0])

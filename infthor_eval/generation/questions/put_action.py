@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 from infthor_eval.generation.questions import candidates
 from infthor_eval.generation.questions.candidates import Candidate, type_question
 from infthor_eval.generation.questions.history import ObjectMove, TrajectoryHistory
+from infthor_eval.grouping import grouped
 from infthor_eval.household.wording import in_or_on
 
 QUESTION_TYPE = "put_action"
@@ -40,10 +41,7 @@ def further_puts(history: TrajectoryHistory) -> Iterator[Candidate]:
 
 def _by_type(history: TrajectoryHistory) -> dict[str, list[ObjectMove]]:
     """Return the moves by the type of their target receptacle."""
-    by_type: dict[str, list[ObjectMove]] = {}
-    for move in history.moves:
-        by_type.setdefault(history.target_type(move), []).append(move)
-    return by_type
+    return grouped((history.target_type(move), move) for move in history.moves)
 
 
 def _what(

@@ -4,7 +4,7 @@ At a moment at which its hand is free it picks up what stands before it, and put
 """
 
 import random
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import combinations, permutations
 from typing import ClassVar
@@ -13,6 +13,7 @@ from infthor_eval.formats.trajectory import ApiAction
 from infthor_eval.generation.questions.counting import ALL
 from infthor_eval.generation.twins.episode import Episode
 from infthor_eval.generation.twins.insertions import Insertion, in_reach, moments
+from infthor_eval.generation.twins.kinds import varied
 from infthor_eval.household.affordances import goes_into
 from infthor_eval.household.wording import canonical_type
 from infthor_eval.thor.view import ThorObject
@@ -130,7 +131,7 @@ class CountKind:
         )
         edits = _clearest(episode, options)
         rng.shuffle(edits)
-        for index, one, other in _spread(edits):
+        for index, one, other in varied(edits, _items):
             before = self.carries_before(episode, one, other)
             yield _insertion(index, [*before, one], [*before, other], ALL)
 
@@ -156,18 +157,8 @@ class CountKind:
         raise NotImplementedError
 
 
-def _spread(
-    edits: Sequence[tuple[int, _Carry, _Carry]],
-) -> list[tuple[int, _Carry, _Carry]]:
-    """Return edits with those first of which no thing is in an earlier one, so that facts vary."""
-    first: list[tuple[int, _Carry, _Carry]] = []
-    later: list[tuple[int, _Carry, _Carry]] = []
-    used: set[str] = set()
-    for edit in edits:
-        keys = {carry.item.object_id for carry in edit[1:]}
-        (later if keys & used else first).append(edit)
-        used |= keys
-    return [*first, *later]
+def _items(edit: tuple[int, _Carry, _Carry]) -> set[str]:
+    return {carry.item.object_id for carry in edit[1:]}
 
 
 class CountMove(CountKind):
@@ -221,7 +212,7 @@ class PutTarget:
         edits = _clearest(episode, options)
         rng.shuffle(edits)
         edits.sort(key=lambda edit: _n_back(episode, *edit))
-        for index, one, other in _spread(edits):
+        for index, one, other in varied(edits, _items):
             yield _insertion(index, [one], [other])
 
 

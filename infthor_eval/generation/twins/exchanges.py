@@ -8,7 +8,7 @@ from typing import ClassVar, TypeVar
 
 from infthor_eval.formats.trajectory import Scene, Trajectory
 from infthor_eval.generation.twins.episode import Episode
-from infthor_eval.generation.twins.kinds import EditRefused, Worlds
+from infthor_eval.generation.twins.kinds import EditRefused, Worlds, varied
 from infthor_eval.generation.twins.placing import may_fit, scenes_of_both
 from infthor_eval.generation.twins.rewriting import exchange_ids, in_world
 from infthor_eval.household.affordances import SLICEABLE, goes_into
@@ -167,19 +167,8 @@ def _in_order(episode: Episode, rng: random.Random, groups: list[_Group]) -> lis
     Among these are first those of which no object is in an earlier one, so that facts vary.
     """
     rng.shuffle(groups)
-    groups.sort(key=lambda group: sum(_is_unseen(episode, obj) for obj in group))
-    first: list[_Group] = []
-    later: list[_Group] = []
-    used: set[str] = set()
-    for group in groups:
-        keys = {obj.object_id for obj in group}
-        (later if keys & used else first).append(group)
-        used |= keys
-    return [*first, *later]
-
-
-def _is_unseen(episode: Episode, obj: ThorObject) -> bool:
-    return obj.object_id not in episode.history.seen
+    groups.sort(key=lambda group: sum(obj.object_id not in episode.history.seen for obj in group))
+    return varied(groups, lambda group: {obj.object_id for obj in group})
 
 
 def _is_alone(episode: Episode, obj: ThorObject) -> bool:

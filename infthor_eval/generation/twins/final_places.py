@@ -125,7 +125,7 @@ def place_in(
     states = history.states(last)
     state = states.get(item)
     holder = None if state is None else logged_parent(state, states)
-    if state is None or holder is None or not _is_fixture(holder, fixtures):
+    if state is None or holder is None or holder not in fixtures or fixtures[holder].pickupable:
         raise Difference("the object is in or on nothing that stays")
     shown = [frame for frame in range(last + 1) if _shows_there(history, frame, item, holder)]
     if not shown:
@@ -134,10 +134,6 @@ def place_in(
         raise Difference("the object was in view a moment ago")
     x, _, z = state.position
     return TwinPlace(holder, x, z)
-
-
-def _is_fixture(key: str, fixtures: dict[str, ThorObject]) -> bool:
-    return key in fixtures and not fixtures[key].pickupable
 
 
 def _shows_there(history: TrajectoryHistory, frame: int, item: str, holder: str) -> bool:

@@ -5,15 +5,16 @@ another package, an entry point of the group `infthor_eval.twins`.
 """
 
 import random
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
-from typing import ClassVar, Protocol
+from typing import ClassVar, Protocol, TypeVar
 
 from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.generation.twins.episode import Episode
 from infthor_eval.plugins import PluginTable
 from infthor_eval.thor.simulator import Simulator
 
+T = TypeVar("T")
 _HERE = "infthor_eval.generation.twins"
 KINDS = PluginTable(
     "kind of twins",
@@ -103,3 +104,20 @@ class EditKind(Protocol):
 
     def propose(self, episode: Episode, rng: random.Random) -> Iterator[Proposal]:
         """Yield edits of an episode that may be possible, in random order."""
+
+
+def varied(edits: Iterable[T], keys_of: Callable[[T], set[str]]) -> list[T]:
+    """Return edits with those first of which no object is in an earlier one, so that facts vary.
+
+    Args:
+        edits: the edits.
+        keys_of: returns the ids of the objects of one.
+    """
+    first: list[T] = []
+    later: list[T] = []
+    used: set[str] = set()
+    for edit in edits:
+        keys = keys_of(edit)
+        (later if keys & used else first).append(edit)
+        used |= keys
+    return [*first, *later]

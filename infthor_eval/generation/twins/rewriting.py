@@ -107,17 +107,10 @@ def first_subgoals(world: Trajectory, n_high: int) -> Trajectory:
     return msgspec.structs.replace(
         world,
         plan=msgspec.structs.replace(world.plan, low_actions=low_actions, high_pddl=high_pddl),
-        sub_tasks=tasks_of(world)[: len(parts)],
+        sub_tasks=world.tasks[: len(parts)],
         sub_trajs=parts,
         long_horizon_task=None,
     )
-
-
-def tasks_of(world: Trajectory) -> list[SubTask]:
-    """Return the tasks of a world's parts; some files have an earlier final one apart."""
-    final = world.long_horizon_task
-    apart = final is not None and len(world.sub_trajs) == len(world.sub_tasks) + 1
-    return [*world.sub_tasks, final] if apart and final is not None else list(world.sub_tasks)
 
 
 def exchange_ids(ids: Mapping[str, str]) -> Callable[[str], str]:

@@ -169,7 +169,7 @@ def make_twins(
     for name in ("metadata", _DRAFTS):
         (out / name).mkdir(parents=True, exist_ok=True)
     claim_for_simulator(out, launch.label, launch.frames)
-    run_job = partial(_draft_one, out=out, settings=settings, draft=draft)
+    run_job = partial(_draft_item, out=out, settings=settings, form=TwinDraft, draft=draft)
     start = partial(SimulatorWorker, partial(Simulator, launch, max_copies=MOST_MARKS), run_job)
     items = selection.items
 
@@ -186,14 +186,6 @@ def make_twins(
     n_resumed = sum(outcome.is_resumed for outcome in outcomes)
     numbers = _Numbers(drafts, chosen)
     return numbers.summary(n_resumed, failures, round(time.monotonic() - started, 1))
-
-
-def _draft_one(
-    item: _Item, simulator: Simulator, out: Path, settings: TwinSettings, draft: DraftTwins
-) -> _DraftOutcome[TwinDraft]:
-    source, trajectory = item
-    make = partial(draft, trajectory, source.digest, settings, simulator=simulator, out=out)
-    return _draft_item(item, out, settings, TwinDraft, make)
 
 
 def _require_distinct(drafts: Iterable[TwinDraft]) -> None:
@@ -364,7 +356,9 @@ def make_final_tasks(
     for name in (TRAJECTORIES, _DRAFTS):
         (out / name).mkdir(parents=True, exist_ok=True)
     claim_for_simulator(out, launch.label, launch.frames)
-    run_job = partial(_draft_final_task, out=out, settings=settings)
+    run_job = partial(
+        _draft_item, out=out, settings=settings, form=FinalTaskDraft, draft=draft_final_tasks
+    )
     start = partial(SimulatorWorker, partial(Simulator, launch), run_job)
     items = selection.items
 
@@ -388,25 +382,24 @@ def make_final_tasks(
     )
 
 
-def _draft_final_task(
-    item: _Item, simulator: Simulator, out: Path, settings: TwinSettings
-) -> _DraftOutcome[FinalTaskDraft]:
-    source, trajectory = item
-    make = partial(draft_final_tasks, trajectory, source.digest, settings, simulator, out)
-    return _draft_item(item, out, settings, FinalTaskDraft, make)
-
-
 def _draft_item(
-    item: _Item, out: Path, settings: TwinSettings, form: type[_Draft], make: Callable[[], _Draft]
+    item: _Item,
+    simulator: Simulator,
+    *,
+    out: Path,
+    settings: TwinSettings,
+    form: type[_Draft],
+    draft: Callable[..., _Draft],
 ) -> _DraftOutcome[_Draft]:
     """Return the draft of a trajectory: of an earlier run if it is the same, else made and written.
 
     Args:
         item: the trajectory.
+        simulator: the simulator in which it is made.
         out: folder of the set.
         settings: how twins are made.
         form: type of the draft.
-        make: makes it.
+        draft: makes it.
     """
     source, trajectory = item
     # Not `.json`, so that the set may be read as a folder of trajectories.
@@ -415,12 +408,12 @@ def _draft_item(
         if is_written(file):
             return _DraftOutcome(_read(file, source.digest, settings, form), is_resumed=True)
         with freeze_existing_objects(), wrap_malformed():
-            draft = make()
+            made = draft(trajectory, source.digest, settings, simulator=simulator, out=out)
         with write_atomically(file) as partial_file:
-            partial_file.write_bytes(msgspec.json.encode(draft) + b"\n")
+            partial_file.write_bytes(msgspec.json.encode(made) + b"\n")
     except InfthorError as error:
         return _DraftOutcome(failure=_failure_line(item, error))
-    return _DraftOutcome(draft)
+    return _DraftOutcome(made)
 
 
 def _failure_line(item: _Item, error: InfthorError) -> str:

@@ -28,6 +28,7 @@ from infthor_eval.generation.simulator_jobs import (
 from infthor_eval.generation.twins.comparison import Difference
 from infthor_eval.generation.twins.replays import WORLD, Replays
 from infthor_eval.generation.twins.rewriting import first_subgoals, without_traces
+from infthor_eval.grouping import grouped
 from infthor_eval.storage.digests import digest
 from infthor_eval.thor.launch import embedded_launch
 from infthor_eval.thor.simulator import Simulator
@@ -96,9 +97,7 @@ def draw_worlds(
         DataError: a world cannot be carried out here.
     """
     (out / "metadata").mkdir(exist_ok=True)
-    scenes: dict[str, list[Trajectory]] = {}
-    for world in _worlds(packed):
-        scenes.setdefault(world.scene.floor_plan, []).append(world)
+    scenes = grouped((world.scene.floor_plan, world) for world in _worlds(packed))
     draw = partial(_draw, expected=expected_digests(packed), out=out)
     start = partial(SimulatorWorker, partial(Simulator, embedded_launch()), draw)
     drawn = collect_outcomes(

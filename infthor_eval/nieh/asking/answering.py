@@ -15,7 +15,7 @@ from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.question import Answer
 from infthor_eval.memory import Write
 from infthor_eval.nieh.asking.baselines import Baseline, Blind, Predict
-from infthor_eval.nieh.asking.budget import budget_of
+from infthor_eval.nieh.asking.budget import describe_budget
 from infthor_eval.nieh.asking.notebook import Notebook
 from infthor_eval.nieh.asking.recalling import Recaller, apply_recall
 from infthor_eval.nieh.contexts.video import as_images
@@ -149,7 +149,7 @@ class _ModelAnswerer:
     def cost(self, prepared: PreparedTask) -> str | None:
         lines = []
         if self._model.capabilities.counts_tokens:
-            lines.append(budget_of(prepared, self._model).description)
+            lines.append(describe_budget(prepared, self._model))
         if any(sample.awaits_recall for sample in prepared.task_samples.samples):
             lines.append("what a memory recalls for each question is not counted yet")
         if prepared.task_samples.shows_films:

@@ -1,7 +1,6 @@
 """Tokens of a task's requests against the model's limit, counted before the first request."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 
 from infthor_eval.errors import DataError, ModelError
 from infthor_eval.nieh.contexts import QuestionVariant
@@ -10,73 +9,32 @@ from infthor_eval.nieh.task import PreparedTask
 from model_adapters import Model, Part
 
 
-@dataclass(frozen=True)
-class Budget:
-    """Tokens of one task's requests against the model's limit.
+def describe_budget(prepared: PreparedTask, model: Model) -> str:
+    """Return in words what a task's requests have in tokens, and how that fits the model's limit.
 
-    Attributes:
-        longest: tokens of its longest request, with room for the reply.
-        limit: the model's limit; None if it has none.
-        limit_before: the limit without a RoPE extension; None if nothing is extended.
-        n_contexts: number of different contexts.
-        n_truncated: number of contexts without some frames of their trajectory, to keep their size.
-        n_extended: number of contexts that fit only with the extension.
-        n_refused: number of contexts beyond the limit; their questions will be recorded as failed.
+    They are counted as the model's own processor does, with room for the reply. Questions in one
+    context differ by a few words, so each context is counted once, with its longest question.
     """
-
-    longest: int
-    limit: int | None
-    limit_before: int | None
-    n_contexts: int
-    n_truncated: int
-    n_extended: int
-    n_refused: int
-
-    @property
-    def description(self) -> str:
-        """The budget and its consequences in words."""
-        limit = "no limit" if self.limit is None else f"limit {self.limit:,}"
-        limit += (
-            "" if self.limit_before is None else f", {self.limit_before:,} before its extension"
-        )
-        return (
-            f"{self.n_contexts} contexts, the longest request {self.longest:,} tokens ({limit}): "
-            f"{self._outcome}"
-        )
-
-    @property
-    def _outcome(self) -> str:
-        counted = [
-            (self.n_truncated, "truncated: frames cut off to keep the context's size"),
-            (self.n_extended, "extended: longer than the model takes without rope"),
-            (self.n_refused, "refused: longer than the model takes"),
-        ]
-        return (
-            "; ".join(f"{n} of {self.n_contexts} contexts {what}" for n, what in counted if n)
-            or "fits"
-        )
-
-
-def budget_of(prepared: PreparedTask, model: Model) -> Budget:
-    """Count the tokens of a task's requests as the model's own processor does.
-
-    Questions in one context differ by a few words, so each context is counted once, with its
-    longest question.
-    """
-    capabilities = model.capabilities
-    limit = capabilities.max_tokens
-    before = capabilities.max_tokens_before_extension
+    limit = model.capabilities.max_tokens
+    before = model.capabilities.max_tokens_before_extension
     longest = _longest_questions(prepared.task_samples.samples)
     counts = _counts(model, prepared, longest)
     fitting = [count for count in counts if limit is None or count <= limit]
-    return Budget(
-        longest=max(counts, default=0),
-        limit=limit,
-        limit_before=before,
-        n_contexts=len(counts),
-        n_truncated=sum(sample.n_cut > 0 for sample in longest),
-        n_extended=sum(before is not None and count > before for count in fitting),
-        n_refused=len(counts) - len(fitting),
+    n_truncated = sum(sample.n_cut > 0 for sample in longest)
+    n_extended = sum(before is not None and count > before for count in fitting)
+    counted = [
+        (n_truncated, "truncated: frames cut off to keep the context's size"),
+        (n_extended, "extended: longer than the model takes without rope"),
+        # Their questions will be recorded as failed.
+        (len(counts) - len(fitting), "refused: longer than the model takes"),
+    ]
+    outcome = "; ".join(f"{n} of {len(counts)} contexts {what}" for n, what in counted if n)
+    of_model = "no limit" if limit is None else f"limit {limit:,}"
+    if before is not None:
+        of_model += f", {before:,} before its extension"
+    return (
+        f"{len(counts)} contexts, the longest request {max(counts, default=0):,} tokens "
+        f"({of_model}): {outcome or 'fits'}"
     )
 
 

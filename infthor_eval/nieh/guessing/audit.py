@@ -13,6 +13,7 @@ from functools import cache, partial
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
 from infthor_eval.formats.question_forms import type_of
+from infthor_eval.grouping import grouped
 from infthor_eval.nieh.docs import doc_target
 from infthor_eval.nieh.guessing.blind import (
     questions_by_file,
@@ -82,9 +83,7 @@ class Group:
     @property
     def chance(self) -> float:
         """Mean score of an answer that is drawn from those of a question's form (`chance_of`)."""
-        by_form: dict[str, list[Question]] = {}
-        for audited in self.questions:
-            by_form.setdefault(form_of(audited.question), []).append(audited.question)
+        by_form = grouped((form_of(it.question), it.question) for it in self.questions)
         total = sum(chance_of(questions) * len(questions) for questions in by_form.values())
         return total / len(self.questions)
 
@@ -97,10 +96,7 @@ class Group:
 
         It is empty if no question of the group is paired with another of it.
         """
-        pairs: dict[str, list[tuple[float, ...]]] = {}
-        for audited in self.questions:
-            if audited.question.pair:
-                pairs.setdefault(audited.question.pair, []).append(audited.scores)
+        pairs = grouped((it.question.pair, it.scores) for it in self.questions if it.question.pair)
         rows = []
         for scores in pairs.values():
             if len(scores) == 2:

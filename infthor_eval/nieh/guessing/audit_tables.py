@@ -1,11 +1,11 @@
 """Audit tables: what guessers get by file, form, type and clues, and runs above `blind`."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from infthor_eval.nieh.guessing.audit import Audit, Group
 from infthor_eval.nieh.guessing.balancing import MARGIN, Balanced
-from infthor_eval.nieh.results.above_blind import FormScore
-from infthor_eval.nieh.results.summary import NiehSummary, main_metric
+from infthor_eval.nieh.results.cells import percent
+from infthor_eval.nieh.results.summary import main_metric, named_tasks
 from infthor_eval.runs import RunSummary
 from infthor_eval.tables import Column, Row, Table
 
@@ -69,38 +69,28 @@ def _cells(group: Group) -> tuple[str, ...]:
         str(len(group.questions)),
         str(len(group.answers)),
         f"{group.entropy:.2f}",
-        _percent(group.share_yes),
-        _percent(group.chance),
-        _percent(group.best_without_scene()),
-        _percent(group.means()[-1]),
-        _percent(mean),
+        percent(group.share_yes),
+        percent(group.chance),
+        percent(group.best_without_scene()),
+        percent(group.means()[-1]),
+        percent(mean),
         name,
     )
-
-
-def _percent(share: float | None) -> str:
-    return "-" if share is None else f"{100 * share:.1f}"
 
 
 def runs_table(runs: Sequence[RunSummary]) -> Table:
     """Return the scores of runs by form beside that of `blind`; forms that it solves are marked."""
     rows = []
-    for run in runs:
-        assert isinstance(run.summary, NiehSummary)
-        for name, task in run.summary.tasks.items():
-            above = task.above_blind.get(main_metric(task))
-            forms: Mapping[str, FormScore] = above.forms if above else {}
-            for number, (form, score) in enumerate(forms.items(), 1):
-                assert above is not None
-                mark = " (solved)" if form in above.solved_forms else ""
-                cells = (f"{100 * score.score:.1f}", f"{100 * score.blind:.1f}{mark}")
-                points = f"{100 * (score.score - score.blind):+.1f}"
-                rows.append(
-                    Row(
-                        (run.header.label, name, form, str(score.n), *cells, points),
-                        ends_section=number == len(forms),
-                    )
-                )
+    for run, name, task in named_tasks(runs):
+        above = task.above_blind.get(main_metric(task))
+        if above is None:
+            continue
+        for number, (form, score) in enumerate(above.forms.items(), 1):
+            mark = " (solved)" if form in above.solved_forms else ""
+            shares = (percent(score.score), f"{percent(score.blind)}{mark}")
+            points = f"{100 * (score.score - score.blind):+.1f}"
+            cells = (run, name, form, str(score.n), *shares, points)
+            rows.append(Row(cells, ends_section=number == len(above.forms)))
     heads = [Column(name, False) for name in ("model", "task", "form of question")]
     note = "solved: blind gets nearly all of it, so it is not in the score above blind."
     columns = (*heads, *map(Column, ("questions", "score, %", "blind, %", "points above")))

@@ -20,6 +20,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from infthor_eval.formats.question import Question
+from infthor_eval.grouping import grouped
 from infthor_eval.nieh.docs import doc_target
 from infthor_eval.nieh.guessing.audit import chance_of
 from infthor_eval.nieh.guessing.blind import score_guesses
@@ -76,19 +77,14 @@ def _name(question: Question) -> str:
 
 
 def _by_form(questions: Sequence[Question]) -> dict[str, list[Question]]:
-    groups: dict[str, list[Question]] = {}
-    for question in questions:
-        groups.setdefault(form_of(question), []).append(question)
-    return groups
+    return grouped((form_of(question), question) for question in questions)
 
 
 def _cut_answers(questions: Sequence[Question]) -> list[Question]:
     """Return the questions without those that step 1 cuts; of too many the first ones are kept."""
     chosen: set[str] = set()
     for group in _by_form(questions).values():
-        by_answer: dict[str, list[Question]] = {}
-        for question in group:
-            by_answer.setdefault(doc_target(question), []).append(question)
+        by_answer = grouped((doc_target(question), question) for question in group)
         commonest = sorted(by_answer.values(), key=len, reverse=True)
         n_answers, most = _best_cut([len(of_answer) for of_answer in commonest])
         chosen |= {

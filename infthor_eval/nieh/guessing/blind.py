@@ -14,6 +14,7 @@ import msgspec
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
 from infthor_eval.formats.reading import NOT_JSON
+from infthor_eval.grouping import grouped
 from infthor_eval.nieh import numbers, scoring
 from infthor_eval.nieh.contexts import QuestionVariant
 from infthor_eval.nieh.guessing.chains import form_of
@@ -82,9 +83,7 @@ def _learn(data: NiehSet, knowledge: Knowledge) -> dict[str, BlindGuess]:
     for questions in questions_by_file(data).values():
         replies = blind_guesser(knowledge).guess(list(map(sample_on_clues, questions)))
         scored = [scores(*it) for it in zip(replies, (it.answers for it in questions), strict=True)]
-        by_form: dict[str, list[dict[str, float]]] = {}
-        for question, of_question in zip(questions, scored, strict=True):
-            by_form.setdefault(form_of(question), []).append(of_question)
+        by_form = grouped(zip(map(form_of, questions), scored, strict=True))
         means = {
             form: {name: fmean(it[name] for it in of_form) for name in of_form[0]}
             for form, of_form in by_form.items()
@@ -99,10 +98,7 @@ def _learn(data: NiehSet, knowledge: Knowledge) -> dict[str, BlindGuess]:
 
 def questions_by_file(data: NiehSet) -> dict[str, list[Question]]:
     """Return the questions that can be asked by file name (empty if the set has one file alone)."""
-    by_file: dict[str, list[Question]] = {}
-    for question in data.questions:
-        by_file.setdefault(question.file, []).append(question)
-    return by_file
+    return grouped((question.file, question) for question in data.questions)
 
 
 def score_guesses(

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 from infthor_eval.errors import DataError
 from infthor_eval.formats.nieh_set import NiehSet
-from infthor_eval.formats.question import Question
 from infthor_eval.formats.step_log import Step, read_steps
 from infthor_eval.formats.trajectory import read_trajectory
+from infthor_eval.grouping import grouped
 
 _LAST_PIXEL = 299
 _LARGE = 90  # pixels from which on an object counts as in view, as for questions
@@ -40,9 +40,7 @@ def read_clue_facts(data: NiehSet) -> dict[str, tuple[ClueFacts, ...]]:
     Questions on trajectories whose log does not say what frames show are left out.
     """
     facts: dict[str, tuple[ClueFacts, ...]] = {}
-    by_trajectory: dict[str, list[Question]] = {}
-    for question in data.questions:
-        by_trajectory.setdefault(question.traj_id, []).append(question)
+    by_trajectory = grouped((question.traj_id, question) for question in data.questions)
     for traj_id, questions in by_trajectory.items():
         steps = _read_log(data, traj_id)
         of_frame = {step.img_idx: _facts_of(step, len(steps)) for step in steps}

@@ -6,7 +6,6 @@ only if it has the hash in the record, so its frames are those that were sent.
 """
 
 from collections.abc import Iterator, Mapping
-from functools import cached_property
 from typing import Any, NamedTuple
 
 from infthor_eval.errors import DataError
@@ -76,7 +75,7 @@ class RequestRebuilder:
         return RebuiltRequest(context, text)
 
     def _find_sample(self, record: UnitRecord[NiehAnswer]) -> QuestionVariant:
-        question = self._questions.get(record.id)
+        question = self._samples.data.by_id.get(record.id)
         if question is None:
             raise DataError("its question is not in the set")
         if not record.fingerprint:
@@ -103,7 +102,3 @@ class RequestRebuilder:
         elif record.payload.recall is not None:
             every = tuple(range(len(data.frames_until(question))))
             yield apply_recall(QuestionVariant(question, every), record.payload.recall)
-
-    @cached_property
-    def _questions(self) -> Mapping[str, Question]:
-        return {question.id: question for question in self._samples.data.questions}

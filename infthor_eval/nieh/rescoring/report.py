@@ -1,12 +1,13 @@
 """What scoring again has changed, and how judge and rules agree: `rescored.json`, and tables."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import msgspec
 
 from infthor_eval.nieh.config import NiehConfig
 from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.nieh.rescoring.judging import JUDGED, Agreement, Verdicts
+from infthor_eval.nieh.results.cells import percent
 from infthor_eval.nieh.scoring import SCORERS
 from infthor_eval.runs import UnitKey, UnitRecord
 from infthor_eval.tables import Column, Row, Table
@@ -123,11 +124,12 @@ def sources_of(config: NiehConfig) -> dict[str, str]:
 
 def change_table(report: RescoringReport, sources: Mapping[str, str]) -> Table:
     """Return the means today and in the journal, by task and metric, with whose metric it is."""
-    rows = [
-        Row((task, *cells))
-        for task, changes in report.tasks.items()
-        for cells in _change_cells(changes, sources)
-    ]
+    rows = []
+    for task, changes in report.tasks.items():
+        for name, change in changes.items():
+            differ = str(change.n_differ) if change.n_before else "-"
+            means = (percent(change.mean_before, 2), percent(change.mean, 2))
+            rows.append(Row((task, name, sources[name], str(change.n), *means, differ)))
     numbers = ("replies", "in the journal", "today", "scores that differ")
     columns = (
         Column("task", False),
@@ -136,25 +138,6 @@ def change_table(report: RescoringReport, sources: Mapping[str, str]) -> Table:
         *map(Column, numbers),
     )
     return Table("Scores of the replies, mean in %", columns, tuple(rows))
-
-
-def _change_cells(
-    changes: Mapping[str, Change], sources: Mapping[str, str]
-) -> Iterator[tuple[str, ...]]:
-    for name, change in changes.items():
-        differ = str(change.n_differ) if change.n_before else "-"
-        yield (
-            name,
-            sources[name],
-            str(change.n),
-            _percent(change.mean_before),
-            _percent(change.mean),
-            differ,
-        )
-
-
-def _percent(share: float | None) -> str:
-    return "-" if share is None else f"{100 * share:.2f}"
 
 
 def agreement_table(agreement: Agreement, judge: str) -> Table:
@@ -166,17 +149,9 @@ def agreement_table(agreement: Agreement, judge: str) -> Table:
     )
     numbers = ("n", "right", "partly", "wrong", "neither", "not asked")
     columns = (Column("open-ended replies that", False), *map(Column, numbers))
-    note = f"Judge and rules agree on {_percent(agreement.share)} % of the sample."
+    note = f"Judge and rules agree on {percent(agreement.share, 2)} % of the sample."
     return Table(f"Verdicts of {judge}", columns, rows, (note,))
 
 
 def _verdicts_row(name: str, counts: Verdicts) -> Row:
-    numbers = (
-        counts.n,
-        counts.n_right,
-        counts.n_partly,
-        counts.n_wrong,
-        counts.n_neither,
-        counts.n_not_asked,
-    )
-    return Row((name, *map(str, numbers)))
+    return Row((name, *map(str, msgspec.structs.astuple(counts))))

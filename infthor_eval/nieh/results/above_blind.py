@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 import msgspec
 
+from infthor_eval.grouping import grouped
 from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.runs import UnitRecord
 from infthor_eval.statistics import bootstrap_interval
@@ -115,15 +116,11 @@ def score_range(records: Sequence[UnitRecord[NiehAnswer]], scorer: str) -> tuple
 
 
 def _by_form(records: Sequence[UnitRecord[NiehAnswer]], scorer: str) -> dict[str, FormScore]:
-    by_form: dict[str, list[tuple[float, float]]] = {}
-    for record in records:
-        assert record.payload.blind is not None
-        pair = record.payload.scores.get(scorer, 0.0), record.payload.blind.scores[scorer]
-        by_form.setdefault(_form(record), []).append(pair)
     scores = {}
-    for form, pairs in sorted(by_form.items()):
-        replied, blind = zip(*pairs, strict=True)
-        scores[form] = FormScore(len(pairs), sum(replied) / len(pairs), sum(blind) / len(pairs))
+    for form, same in sorted(grouped((_form(record), record) for record in records).items()):
+        replied = sum(record.payload.scores.get(scorer, 0.0) for record in same)
+        blind = sum(record.payload.blind.scores[scorer] for record in same if record.payload.blind)
+        scores[form] = FormScore(len(same), replied / len(same), blind / len(same))
     return scores
 
 

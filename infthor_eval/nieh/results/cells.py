@@ -82,6 +82,11 @@ def score_of(record: Record, metric: str) -> float:
     return record.payload.scores.get(metric, 0.0)
 
 
+def percent(share: float | None, n_digits: int = 1) -> str:
+    """Return a share in percent; `-` if there is none."""
+    return "-" if share is None else f"{100 * share:.{n_digits}f}"
+
+
 def mean_cell(cell: Cell | None, metric: str, n_digits: int = 2) -> TableCell:
     """Return a mean in percent, with the number of answers if not all samples have one; `-` if
     there are no samples."""

@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from infthor_eval.nieh.results.cells import percent
 from infthor_eval.nieh.results.facets import LENGTH
 from infthor_eval.nieh.results.summary import NiehSummary, TaskSummary
 from infthor_eval.runs import RunSummary
@@ -49,11 +50,9 @@ def effective_lengths(runs: Sequence[RunSummary]) -> list[Table]:
             Row(
                 (
                     *(series.model, series.context, series.scorer),
-                    *(_percent(series.base.score), effective_length(series.base.score, by_score)),
-                    *(_percent(series.base.above), effective_length(series.base.above, by_above)),
-                    ", ".join(
-                        f"{point.length}K {_percent(point.score)}" for point in series.points
-                    ),
+                    *(percent(series.base.score), effective_length(series.base.score, by_score)),
+                    *(percent(series.base.above), effective_length(series.base.above, by_above)),
+                    ", ".join(f"{point.length}K {percent(point.score)}" for point in series.points),
                 )
             )
         )
@@ -154,7 +153,3 @@ def _point(length: str, task: TaskSummary, scorer: str) -> _Point:
     score = task.total.scores.get(scorer)
     above = task.above_blind.get(scorer)
     return _Point(length, score.mean if score else None, above.mean if above else None)
-
-
-def _percent(value: float | None) -> str:
-    return "-" if value is None else f"{100 * value:.1f}"

@@ -6,7 +6,7 @@ from infthor_eval.facets import facet_table
 from infthor_eval.nieh.results.above_blind import SOLVED, AboveBlind
 from infthor_eval.nieh.results.cells import Cell, mean_cell, score_interval
 from infthor_eval.nieh.results.facets import FACETS, QuestionFacet
-from infthor_eval.nieh.results.summary import NiehSummary, TaskSummary
+from infthor_eval.nieh.results.summary import TaskSummary, named_tasks
 from infthor_eval.runs import RunSummary
 from infthor_eval.tables import Table, TableCell
 
@@ -20,7 +20,7 @@ def question_facet_tables(runs: Sequence[RunSummary]) -> list[Table]:
 
 
 def _table(facet: QuestionFacet, runs: Sequence[RunSummary]) -> list[Table]:
-    used = {name for *_, task in _tasks(runs) for name in task.by[facet.name]}
+    used = {name for *_, task in named_tasks(runs) for name in task.by[facet.name]}
     return facet_table(
         f"Accuracy, % by {facet.title or facet.heading} (questions)",
         ("model", "task", *(("file",) if facet.of_files else ()), "scorer"),
@@ -35,7 +35,7 @@ def _rows(
     facet: QuestionFacet, runs: Sequence[RunSummary]
 ) -> Iterator[tuple[tuple[str, ...], dict[str, tuple[Cell, str]]]]:
     """Yield the names and the cells of a row per task, metric, and file if the facet has those."""
-    for run, name, task in _tasks(runs):
+    for run, name, task in named_tasks(runs):
         if not facet.is_worth(task.context, task.by[facet.name]):
             continue
         for file, cells in facet_cells(facet, task).items():
@@ -68,9 +68,11 @@ def above_blind_cell(above: AboveBlind | None) -> TableCell:
 
 def above_blind_notes(runs: Sequence[RunSummary]) -> list[str]:
     """Return what the column says, and what it leaves out."""
-    scores = [score for _, _, task in _tasks(runs) for score in task.above_blind.values()]
+    scores = [score for _, _, task in named_tasks(runs) for score in task.above_blind.values()]
     if not any(score.n for score in scores):
-        is_alone = any(len(of) == 1 for *_, task in _tasks(runs) for of in task.scores.values())
+        is_alone = any(
+            len(of) == 1 for *_, task in named_tasks(runs) for of in task.scores.values()
+        )
         is_unknown = any(score.n_unknown for score in scores)
         return [_ALONE] if is_alone and is_unknown else []
     solved = sorted(
@@ -86,12 +88,6 @@ def above_blind_notes(runs: Sequence[RunSummary]) -> list[str]:
         "above blind: % of what the baseline blind has not that was got, 0 for blind and 100 "
         f"for all right, with its interval over resampled trajectories.{left_out}"
     ]
-
-
-def _tasks(runs: Sequence[RunSummary]) -> Iterator[tuple[str, str, TaskSummary]]:
-    for run in runs:
-        assert isinstance(run.summary, NiehSummary)
-        yield from ((run.header.label, name, task) for name, task in run.summary.tasks.items())
 
 
 def _cell(cell: Cell | None, metric: str) -> TableCell:

@@ -187,7 +187,9 @@ def control_tables(runs: Sequence[RunSummary]) -> list[Table]:
     found = [(group, task) for group in groups for task in _tasks(group)]
     if not found:
         return []
-    with_pairs = any(_summary(run, task).pairs for group, task in found for run in group.values())
+    with_pairs = any(
+        run.summary.tasks[task].pairs for group, task in found for run in group.values()
+    )
     columns = (
         *(Column(name, False) for name in ("model", "task", "context")),
         *map(Column, _FRAMES),
@@ -229,13 +231,10 @@ def _tasks(group: _Controls) -> Iterator[str]:
     return (name for name, task in run.summary.tasks.items() if task.n)
 
 
-def _summary(run: RunSummary, task: str) -> TaskSummary:
-    summary: TaskSummary = run.summary.tasks[task]
-    return summary
-
-
 def _control_cells(group: _Controls, task: str, with_pairs: bool) -> Iterator[str]:
-    tasks = {frames: _summary(run, task) for frames, run in group.items()}
+    tasks: Mapping[str, TaskSummary] = {
+        frames: run.summary.tasks[task] for frames, run in group.items()
+    }
     first = next(iter(tasks.values()))
     metric = main_metric(first)
     yield next(iter(group.values())).header.name

@@ -1,13 +1,12 @@
 """The table of memories: what each got right, what it recalled of the evidence, what that took."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from operator import itemgetter
-from typing import Any
 
 from msgspec.structs import replace
 
 from infthor_eval.nieh.config import NiehConfig
-from infthor_eval.nieh.results.cells import mean_cell, score_interval
+from infthor_eval.nieh.results.cells import mean_cell, percent, score_interval
 from infthor_eval.nieh.results.facets import SHOWN_CLUES
 from infthor_eval.nieh.results.gains import Gain, difference_cell, gain_cell, paired_gain
 from infthor_eval.nieh.results.memory_summary import KeptMeans, subject_of
@@ -139,13 +138,11 @@ def _without_memory(run: RunSummary, name: str) -> NiehConfig:
     config: NiehConfig = run.header.config
     task = config.tasks[name]
     sources = {key: value for key, value in task.sources.items() if key != "memory"}
-    settings = task.settings | {"dataset_kwargs": _without_options(task.dataset_kwargs)}
+    options = ("memory", "budget")
+    own = {key: value for key, value in task.dataset_kwargs.items() if key not in options}
+    settings = task.settings | {"dataset_kwargs": own}
     tasks = {name: replace(task, sources=sources, settings=settings)}
     return replace(config, tasks=tasks, memory=None, memory_args=None, budget=None)
-
-
-def _without_options(settings: Mapping[str, Any]) -> dict[str, Any]:
-    return {key: value for key, value in settings.items() if key not in ("memory", "budget")}
 
 
 def _above_blind(run: RunSummary, name: str) -> float | None:
@@ -155,8 +152,7 @@ def _above_blind(run: RunSummary, name: str) -> float | None:
 
 
 def _above_blind_cell(run: RunSummary, name: str, _: Sequence[RunSummary]) -> str:
-    above = _above_blind(run, name)
-    return "-" if above is None else f"{100 * above:.1f}"
+    return percent(_above_blind(run, name))
 
 
 def _cells(
@@ -181,8 +177,7 @@ def _cells(
 
 
 def _kept_cells(kept: KeptMeans) -> tuple[str, ...]:
-    clues = "-" if kept.clues is None else f"{100 * kept.clues:.1f}"
-    return f"{kept.tokens:,.0f}", f"{kept.bytes / 1e6:.2f}", clues
+    return f"{kept.tokens:,.0f}", f"{kept.bytes / 1e6:.2f}", percent(kept.clues)
 
 
 def _recalled(task: TaskSummary, share: str, metric: str) -> TableCell:

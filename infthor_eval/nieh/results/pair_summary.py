@@ -13,6 +13,7 @@ import msgspec
 
 from infthor_eval.distances import AGES, DISTANCES, LENGTHS, age_class, distance_class, length_class
 from infthor_eval.facets import Facet
+from infthor_eval.grouping import grouped
 from infthor_eval.nieh.records import NiehAnswer, TwinSide
 from infthor_eval.nieh.results.retention import Ladder, Retention, retention_of
 from infthor_eval.nieh.scoring import SCORERS, compared_form, scores
@@ -89,12 +90,11 @@ TwinRecords = tuple[Side, Side]
 
 def find_pairs(records: Iterable[Record]) -> tuple[list[TwinRecords], int]:
     """Return the answered pairs of a task's records, and the number of questions in none."""
-    sides: dict[tuple[str, str, int], list[Side]] = {}
-    for record in sorted(records, key=lambda record: record.key):
-        twin = record.payload.twin
-        if twin is not None:
-            key = twin.pair, record.variant, record.repeat
-            sides.setdefault(key, []).append(Side(record, twin))
+    sides = grouped(
+        ((twin.pair, record.variant, record.repeat), Side(record, twin))
+        for record in sorted(records, key=lambda record: record.key)
+        if (twin := record.payload.twin) is not None
+    )
     pairs = [(it[0], it[1]) for _, it in sorted(sides.items()) if _is_answered(it)]
     return pairs, sum(len(it) for it in sides.values() if not _is_answered(it))
 
@@ -192,10 +192,11 @@ def _pairs(pairs: Sequence[TwinRecords], metric: str) -> Pairs[Side]:
 
 def _n_lost(records: Sequence[Record], n_missing: int) -> int:
     """Return the number of pairs without an answer to one of their questions."""
-    sides: dict[tuple[str, str], list[Record]] = {}
-    for record in records:
-        if record.payload.twin is not None:
-            sides.setdefault((record.payload.twin.pair, record.variant), []).append(record)
+    sides = grouped(
+        ((record.payload.twin.pair, record.variant), record)
+        for record in records
+        if record.payload.twin is not None
+    )
     lost = alone = 0
     for same in sides.values():
         answered = {record.id for record in same if record.state == "answered"}
@@ -232,9 +233,7 @@ def _by_trajectory(scores: Iterable[PairScore]) -> dict[str, dict[str, float]]:
 
 def _by_fact(scores: Sequence[PairScore]) -> Rate:
     """Return the mean over facts, of which each is one observation."""
-    facts: dict[tuple[str, str], list[PairShares]] = {}
-    for it in scores:
-        facts.setdefault((it.cluster, it.fact), []).append(it.shares)
+    facts = grouped(((it.cluster, it.fact), it.shares) for it in scores)
     shares = list(map(PairShares.mean, facts.values()))
     return net_pairs(shares, [cluster for cluster, _ in facts])
 

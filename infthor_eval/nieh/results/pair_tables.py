@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from infthor_eval.facets import Facet, facet_table
 from infthor_eval.nieh.results.pair_summary import PAIR_FACETS, PairSummary, TwinRecords
 from infthor_eval.nieh.results.retention import Kept, Retention
-from infthor_eval.nieh.results.summary import NiehSummary
+from infthor_eval.nieh.results.summary import named_tasks
 from infthor_eval.rates import Rate, format_percent
 from infthor_eval.runs import RunSummary
 from infthor_eval.tables import Column, Row, Table, TableCell
@@ -92,11 +92,9 @@ def half_life_text(retention: Retention) -> str:
 
 
 def _find(runs: Sequence[RunSummary]) -> Iterator[_Found]:
-    for run in runs:
-        assert isinstance(run.summary, NiehSummary)
-        for name, task in run.summary.tasks.items():
-            if task.pairs is not None:
-                yield run.header.label, name, task.context, task.pairs
+    for run, name, task in named_tasks(runs):
+        if task.pairs is not None:
+            yield run, name, task.context, task.pairs
 
 
 def _cells(pairs: PairSummary) -> tuple[TableCell | str, ...]:

@@ -10,7 +10,7 @@ a field of its own, `took`, which results.json leaves out.
 
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
 from itertools import groupby
 from statistics import fmean, variance
@@ -34,7 +34,7 @@ from infthor_eval.nieh.results.memory_summary import (
 from infthor_eval.nieh.results.pair_summary import PairSummary, summarise_pairs
 from infthor_eval.nieh.scoring import SCORERS, compared_form
 from infthor_eval.rates import Rate
-from infthor_eval.runs import UnitRecord
+from infthor_eval.runs import RunSummary, UnitRecord
 
 CLUE_COLUMNS = ("1", "2", ">=3", "total")  # the columns of the paper's Table 4
 OPEN_ENDED = "open-ended"  # column of questions whose answer is neither yes, no nor a number
@@ -196,6 +196,14 @@ def summarise(config: NiehConfig, records: Sequence[Record]) -> NiehSummary:
     return NiehSummary(tasks, took, repeats)
 
 
+def named_tasks(runs: Iterable[RunSummary]) -> Iterator[tuple[str, str, TaskSummary]]:
+    """Yield the run's name, the task's name and the task, of all runs."""
+    for run in runs:
+        assert isinstance(run.summary, NiehSummary)
+        for name, task in run.summary.tasks.items():
+            yield run.header.label, name, task
+
+
 def main_metric(task: TaskSummary) -> str:
     """Return the main metric of a task: the strict scorer, else the first of its own."""
     return _main_metric(task.metrics)
@@ -250,7 +258,7 @@ def _task(replies: Sequence[Record], task: NiehTaskConfig, config: NiehConfig) -
         tokens_per_right=_tokens_per_right(replies, _main_metric(metrics)),
         below_full_marks={name: _below_full_marks(answered, name) for name in metrics},
         scores={name: _by_trajectory(answered, name) for name in metrics},
-        failures=_failures(replies),
+        failures=[Failure(str(it.key), it.failure) for it in replies if it.failure is not None],
         memory=summarise_memory(config, task, records),
         pairs=summarise_pairs(replies, _main_metric(metrics), n_missing),
     )
@@ -262,12 +270,6 @@ def _answered(records: Sequence[Record]) -> list[Record]:
 
 def _below_full_marks(records: Sequence[Record], metric: str) -> list[str]:
     return [str(record.key) for record in records if score_of(record, metric) < 1.0]
-
-
-def _failures(replies: Sequence[Record]) -> list[Failure]:
-    return [
-        Failure(str(record.key), record.failure) for record in replies if record.failure is not None
-    ]
 
 
 def _tokens_per_right(replies: Sequence[Record], metric: str) -> float | None:

@@ -14,7 +14,7 @@ from infthor_eval.formats.question import ABSENCE
 from infthor_eval.nieh.options import SHOWN
 from infthor_eval.nieh.rescoring.report import sources_of
 from infthor_eval.nieh.results.answer_form import form_notes
-from infthor_eval.nieh.results.cells import Cell, both_intervals, mean_cell
+from infthor_eval.nieh.results.cells import Cell, both_intervals, mean_cell, percent
 from infthor_eval.nieh.results.effective_length import effective_lengths
 from infthor_eval.nieh.results.evidence_tables import (
     above_blind_cell,
@@ -37,6 +37,7 @@ from infthor_eval.nieh.results.summary import (
     NiehSummary,
     TaskSummary,
     main_metric,
+    named_tasks,
 )
 from infthor_eval.nieh.scoring import SCORERS
 from infthor_eval.runs import RunSummary
@@ -101,7 +102,7 @@ def tables(runs: Sequence[RunSummary]) -> list[Table]:
     there if a task shows part of a trajectory.
     """
     # Of tasks on one's own data no published row is shown: it is on other questions.
-    contexts = {task.context for _, _, task in _tasks(runs) if task.simulator != OWN_FRAMES}
+    contexts = {task.context for _, _, task in named_tasks(runs) if task.simulator != OWN_FRAMES}
     others = [
         _beside(table, runs)
         for table in published_tables("nieh")
@@ -128,7 +129,7 @@ def overview(runs: Sequence[RunSummary]) -> list[Table]:
 
     A task that asked nothing is a line below the table.
     """
-    tasks = list(_tasks(runs))
+    tasks = list(named_tasks(runs))
     with_samples = [(run, name, task) for run, name, task in tasks if task.n]
     left_out = [_left_out(task) for *_, task in with_samples]
     shown = [at for at in range(len(_LEFT_OUT)) if any(counts[at] != "0" for counts in left_out)]
@@ -193,27 +194,21 @@ def _is_by_clues(table: PublishedTable) -> bool:
     return set(table.columns) <= set(CLUE_COLUMNS)
 
 
-def _tasks(runs: Sequence[RunSummary]) -> Iterator[tuple[str, str, TaskSummary]]:
-    """Yield the run's name, the task's name and the task, of all runs."""
-    for run in runs:
-        assert isinstance(run.summary, NiehSummary)
-        for name, task in run.summary.tasks.items():
-            yield run.header.label, name, task
-
-
 # -- by number of clues
 
 
 def clues_table(runs: Sequence[RunSummary]) -> Table:
     """Return accuracy by clues: a row per run, task and metric, then the published rows."""
     has_blind = any(
-        score.mean is not None for *_, task in _tasks(runs) for score in task.above_blind.values()
+        score.mean is not None
+        for *_, task in named_tasks(runs)
+        for score in task.above_blind.values()
     )
     apart = (OPEN_ENDED, ABSENCE, *(("above blind",) if has_blind else ()))
     numbers = (*CLUE_COLUMNS, "95 %", "bootstrap", *apart, "n", *_LEFT_OUT)
     rows = [row for run in runs for row in _rows_of(run, has_blind=has_blind)]
     notes = [*_LEGEND, *above_blind_notes(runs)]
-    is_own = all(task.simulator == OWN_FRAMES for *_, task in _tasks(runs))
+    is_own = all(task.simulator == OWN_FRAMES for *_, task in named_tasks(runs))
     for table in () if is_own else filter(_is_by_clues, published_tables("nieh")):
         rows += _published_rows(table, runs)
         notes += table.notes
@@ -228,7 +223,7 @@ def clues_table(runs: Sequence[RunSummary]) -> Table:
 
 def _notes(runs: Sequence[RunSummary]) -> list[str]:
     embedded = (
-        [_EMBEDDED] if any(task.simulator == "embedded" for _, _, task in _tasks(runs)) else []
+        [_EMBEDDED] if any(task.simulator == "embedded" for _, _, task in named_tasks(runs)) else []
     )
     is_withheld = any(
         config.withheld for run in runs for config in run.header.config.tasks.values()
@@ -245,7 +240,9 @@ def _notes(runs: Sequence[RunSummary]) -> list[str]:
 
 
 def _rows_of(run: RunSummary, *, has_blind: bool) -> list[Row]:
-    lines = [(name, task, metric) for _, name, task in _tasks([run]) for metric in task.metrics]
+    lines = [
+        (name, task, metric) for _, name, task in named_tasks([run]) for metric in task.metrics
+    ]
     return [
         Row(
             (run.header.label, name, metric, *_cells(task, metric, has_blind=has_blind)),
@@ -295,7 +292,7 @@ def _differences(run: RunSummary, row: PublishedRow, table: PublishedTable) -> I
     published value."""
     if not row.matches(run.header.config.model) or frames_of(run) != SHOWN:
         return
-    for _, name, task in _tasks([run]):
+    for _, name, task in named_tasks([run]):
         # Frames that a simulator of ours rendered are another data set.
         if (
             task.context != table.context
@@ -336,7 +333,7 @@ def _beside(table: PublishedTable, runs: Sequence[RunSummary]) -> Table:
         )
         for row in table.rows
     ]
-    for run, name, task in _tasks([run for run in runs if frames_of(run) == SHOWN]):
+    for run, name, task in named_tasks([run for run in runs if frames_of(run) == SHOWN]):
         if task.context == table.context and table.metric in task.metrics:
             by_file = {short_name(file): cell for file, cell in task.by[FILE.name].items()}
             cells = task.by_clues | task.by["question_type"] | task.by["variant"] | by_file
@@ -364,7 +361,7 @@ def _depth_table(runs: Sequence[RunSummary]) -> list[Table]:
     """Return a table if a task has depths."""
     rows = [
         ((run, name, metric), {depth: (cell, metric) for depth, cell in by_depth(task).items()})
-        for run, name, task in _tasks(runs)
+        for run, name, task in named_tasks(runs)
         if by_depth(task)
         for metric in task.metrics
     ]
@@ -388,17 +385,17 @@ def by_depth(task: TaskSummary) -> dict[str, Cell]:
 
 def _replies_table(runs: Sequence[RunSummary]) -> Table:
     """Return bias to yes, reply length and replies that are no answer, a row per run and task."""
-    thought = any(task.n_thought for _, _, task in _tasks(runs))
+    thought = any(task.n_thought for _, _, task in named_tasks(runs))
     numbers = ["yes/no questions", "gold yes, %", "said yes, %", "tokens per right answer"]
     numbers += ["with thoughts"] if thought else []
     rows = []
-    for run, name, task in _tasks(runs):
+    for run, name, task in named_tasks(runs):
         if not task.n:
             continue
         tokens = "-" if task.tokens_per_right is None else f"{task.tokens_per_right:.1f}"
         further = [tokens, str(task.n_thought)] if thought else [tokens]
         both = (task.yes_no.share_gold_yes, task.yes_no.share_said_yes)
-        shares = ["-" if share is None else f"{100 * share:.1f}" for share in both]
+        shares = list(map(percent, both))
         failures = ", ".join(f"{n} {reason}" for reason, n in task.format_failures.items()) or "-"
         rows.append(Row((run, name, str(task.yes_no.n), *shares, *further, failures)))
     columns = (*_NAMES, *map(Column, numbers), Column("not in the form asked for", False))
@@ -419,7 +416,7 @@ def _repeat_tables(runs: Sequence[RunSummary]) -> list[Table]:
             interval = (
                 "-"
                 if score.low is None or score.high is None
-                else f"{_percent(score.low)}–{_percent(score.high)}"
+                else f"{percent(score.low)}–{percent(score.high)}"
             )
             shares = (
                 of_task.consensus,
@@ -432,18 +429,14 @@ def _repeat_tables(runs: Sequence[RunSummary]) -> list[Table]:
             cells = (
                 f"{of_task.n_repeats}x",
                 str(of_task.n_questions),
-                answered_cell(_percent(of_task.mean), of_task.n_questions, task.n),
+                answered_cell(percent(of_task.mean), of_task.n_questions, task.n),
                 interval,
-                f"±{_percent(of_task.drawing)}",
-                *map(_percent, shares),
-                *map(_percent, spreads),
+                f"±{percent(of_task.drawing)}",
+                *map(percent, shares),
+                *map(percent, spreads),
             )
             rows.append(Row((run.header.label, name, *cells)))
     if not rows:
         return []
     columns = (Column("model", False), Column("task", False), *map(Column, _OF_REPEATS))
     return [Table("Answers that repeat, %, strict scorer", columns, tuple(rows), _REPEATS_LEGEND)]
-
-
-def _percent(value: float) -> str:
-    return f"{100 * value:.1f}"

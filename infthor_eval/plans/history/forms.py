@@ -14,25 +14,21 @@ from infthor_eval.plans.history.retrieved import RetrievedFrames
 from infthor_eval.plans.history.segments import Part, PlanSegment, restart_at, segment_parts
 
 
-class FullHistory:
+class FullHistory(History):
     """The whole history."""
-
-    needs_state: ClassVar[bool] = False
 
     def recall(self, past: Past, count: CountTokens) -> list[Part]:
         """See `History`."""
         return segment_parts(past.all)
 
 
-class PublishedHistory:
+class PublishedHistory(History):
     """The whole history as the published loop writes it.
 
     Three things differ from `FullHistory`: the first action of each past plan stands behind two
     marks, as the plan's own is there already; behind every goal is the first frame of the scene,
     which the loop keeps from its last set-up; plans that belong to no task are left out.
     """
-
-    needs_state: ClassVar[bool] = False
 
     def recall(self, past: Past, count: CountTokens) -> list[Part]:
         """See `History`."""
@@ -47,13 +43,11 @@ class PublishedHistory:
         return parts
 
 
-class GoalHistory:
+class GoalHistory(History):
     """The whole history with goals and actions, as in the published chats of branch `dev`.
 
     Plans begin with a mark and have no text.
     """
-
-    needs_state: ClassVar[bool] = False
 
     def recall(self, past: Past, count: CountTokens) -> list[Part]:
         """See `History`."""
@@ -68,13 +62,11 @@ class GoalHistory:
         return parts
 
 
-class PlanHistory:
+class PlanHistory(History):
     """The plans before in words, as in the published chats of branch `dev`.
 
     Goal, frames and the plan itself are left out; the present frame follows.
     """
-
-    needs_state: ClassVar[bool] = False
 
     def recall(self, past: Past, count: CountTokens) -> list[Part]:
         """See `History`."""
@@ -83,15 +75,13 @@ class PlanHistory:
         return [f"Action history: {text}\n"]
 
 
-class LastTokens:
+class LastTokens(History):
     """As many of the last plans as fit, after their goal and the frame that they begin with.
 
     Whole plans are left out, from the first on, and the goal is repeated if the rest would begin
     without it. So every window has the form of a trajectory's beginning, which is what the models
     were trained on.
     """
-
-    needs_state: ClassVar[bool] = False
 
     def __init__(self, n_tokens: int) -> None:
         """Set the maximum tokens before the first action; the plan's own steps come on top."""
@@ -129,7 +119,7 @@ def _window(segments: Sequence[PlanSegment], n_last: int) -> list[Part]:
     return segment_parts(restart_at(segments, len(segments) - n_last))
 
 
-class StateInWords:
+class StateInWords(History):
     """The present frame, and what was seen before it in words, as in the published text state."""
 
     needs_state: ClassVar[bool] = True

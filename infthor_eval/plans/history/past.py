@@ -1,5 +1,6 @@
 """The true history before a plan, and the protocol of what selects from it."""
 
+from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Protocol
@@ -8,6 +9,7 @@ from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.pictures.blank import blank_like
 from infthor_eval.formats.step_log import ObjectLog
 from infthor_eval.formats.trajectory import Trajectory
+from infthor_eval.household.sequence_text import goal_part, plan_part
 from infthor_eval.memory import Observation
 from infthor_eval.plans.history.segments import Part, PlanSegment, goal_of_last
 
@@ -82,7 +84,7 @@ class Past:
 class History(Protocol):
     """Selects a model's past; `needs_state` is True if it needs the state in words."""
 
-    needs_state: ClassVar[bool]
+    needs_state: ClassVar[bool] = False
 
     def recall(self, past: Past, count: CountTokens) -> list[Part]:
         """Return what the model is given before the first action of a plan.
@@ -94,3 +96,17 @@ class History(Protocol):
             DataError: a frame cannot be read.
             ModelError: the required parts do not fit.
         """
+
+
+class ChosenHistory(History):
+    """What is chosen of the earlier steps, the goal, the present frame, and the plan."""
+
+    def recall(self, past: Past, count: CountTokens) -> list[Part]:
+        """See `History`."""
+        present = past.present
+        chosen = self.choose(past, count)
+        return [*chosen, goal_part(past.goal), present.before, plan_part(present.plan)]
+
+    @abstractmethod
+    def choose(self, past: Past, count: CountTokens) -> list[Part]:
+        """Return what is chosen, in order; see `recall`."""

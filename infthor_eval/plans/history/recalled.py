@@ -4,10 +4,9 @@ import threading
 from collections.abc import Sequence
 from copy import deepcopy
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Any
 
 from infthor_eval.errors import DataError, ModelError, UsageError
-from infthor_eval.household.sequence_text import goal_part, plan_part
 from infthor_eval.memory import (
     MemoryArgs,
     Observation,
@@ -22,17 +21,15 @@ from infthor_eval.memory import (
     read_budget,
     wrap_memory_errors,
 )
-from infthor_eval.plans.history.past import CountTokens, Past
+from infthor_eval.plans.history.past import ChosenHistory, CountTokens, Past
 from infthor_eval.plans.history.segments import Part
 
 
-class RecalledHistory:
+class RecalledHistory(ChosenHistory):
     """What a memory (`infthor_eval.memory`) recalls of earlier steps, the goal, and the frame.
 
     The memory observes each step once, as long as one episode goes on.
     """
-
-    needs_state: ClassVar[bool] = False
 
     def __init__(
         self, name: str, options: MemoryArgs = (), budget: int | None = None, blank: bool = False
@@ -67,11 +64,6 @@ class RecalledHistory:
     def identity(self) -> dict[str, Any]:
         """Return everything that can change what is recalled, as JSON values."""
         return memory_identity(self._name, self._options) | {"budget": self._budget}
-
-    def recall(self, past: Past, count: CountTokens) -> list[Part]:
-        """See `History`."""
-        recalled = self.choose(past, count)
-        return [*recalled, goal_part(past.goal), past.present.before, plan_part(past.present.plan)]
 
     def choose(self, past: Past, count: CountTokens) -> list[Part]:
         """Return what is recalled, in order."""

@@ -8,7 +8,7 @@ simulator.
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any
 
 import msgspec
 from PIL import Image
@@ -16,8 +16,7 @@ from PIL import Image
 from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.trajectory import Trajectory
-from infthor_eval.household.sequence_text import goal_part, plan_part
-from infthor_eval.plans.history.past import CountTokens, Past
+from infthor_eval.plans.history.past import ChosenHistory, CountTokens, Past
 from infthor_eval.plans.history.segments import Part
 from infthor_eval.storage.files import writing_hint
 
@@ -25,28 +24,19 @@ _SIDE = 336  # pixels, of remembered frames in the published script; the present
 _FIRST = "000000000"  # the frame before the first action, which `images` does not list
 
 
-class _Image(msgspec.Struct):
+class NamedImage(msgspec.Struct):
+    """A frame by the name of its file, with the action during which it was taken."""
+
     low_idx: Annotated[int, msgspec.Meta(ge=0)]
     image_name: str
 
 
-class RetrievedFrames:
+class RetrievedFrames(ChosenHistory):
     """The K frames that the file names for a plan's first action, the goal, and the plan."""
-
-    needs_state: ClassVar[bool] = False
 
     def __init__(self, k: int) -> None:
         """Set the number of frames: the file must have a list `topK`."""
         self._k = k
-
-    def recall(self, past: Past, count: CountTokens) -> list[Part]:
-        """See `History`."""
-        return [
-            *self.choose(past, count),
-            goal_part(past.goal),
-            past.present.before,
-            plan_part(past.present.plan),
-        ]
 
     def choose(self, past: Past, count: CountTokens) -> list[Part]:
         """Return the frames in the file's order, 336x336 pixels."""
@@ -94,11 +84,15 @@ def _names(retrieved: Mapping[str, Any] | None, action: int, k: int, entry: str)
 
 def _steps_of_images(trajectory: Trajectory) -> Mapping[str, int]:
     """Return the step of each named frame; all frames of one action stand for its last one."""
-    where = f"trajectory {trajectory.traj_id}: images is no list of low_idx and image_name"
-    hint = "restore the file"
-    with wrap_errors(where, hint, catch=msgspec.ValidationError):
-        images = msgspec.convert(trajectory.images, list[_Image])
+    images = images_of(trajectory)
     return {Path(image.image_name).stem: image.low_idx + 1 for image in images} | {_FIRST: 0}
+
+
+def images_of(trajectory: Trajectory) -> list[NamedImage]:
+    """Return the frames that a trajectory's file lists."""
+    where = f"trajectory {trajectory.traj_id}: images is no list of low_idx and image_name"
+    with wrap_errors(where, "restore the file", catch=msgspec.ValidationError):
+        return msgspec.convert(trajectory.images, list[NamedImage])
 
 
 def _resized(frame: FrameRef) -> FrameRef:

@@ -23,7 +23,7 @@ from infthor_eval.errors import UsageError
 from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.household.sequence_text import ACT
 from infthor_eval.plans.history.forms import GoalHistory, PlanHistory, StateInWords
-from infthor_eval.plans.history.past import CountTokens, History, Past
+from infthor_eval.plans.history.past import ChosenHistory, CountTokens, History, Past
 from infthor_eval.plans.history.recalled import RecalledHistory
 from infthor_eval.plans.history.retrieved import RetrievedFrames
 from infthor_eval.plans.history.segments import Part
@@ -59,7 +59,7 @@ class FinalForm:
 
 
 @dataclass(frozen=True)
-class _TextMemory:
+class _TextMemory(History):
     """The task, and the state of the room in words."""
 
     needs_state: ClassVar[bool] = True
@@ -70,11 +70,10 @@ class _TextMemory:
 
 
 @dataclass(frozen=True)
-class _FrameMemory:
+class _FrameMemory(History):
     """The task, and frames of what came before."""
 
-    frames: RecalledHistory | RetrievedFrames
-    needs_state: ClassVar[bool] = False
+    frames: ChosenHistory
 
     def recall(self, past: Past, count: CountTokens) -> list[Part]:
         """See `History`."""

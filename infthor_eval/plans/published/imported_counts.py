@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from infthor_eval.episodes.records import DONE
 from infthor_eval.errors import DataError, UsageError
-from infthor_eval.formats.plan_logs import LoggedPlans, PlanCount, PlanLog
+from infthor_eval.formats.plan_logs import LoggedPlans, PlanLog
 from infthor_eval.formats.replies.logs import UnreadRow
 from infthor_eval.plans.config import PlansConfig, PlansTaskConfig
 from infthor_eval.plans.plan import PlanKind
@@ -81,7 +81,8 @@ def _header(
 
 
 def _records(row: LoggedPlans) -> Iterator[UnitRecord[PlanRecord]]:
-    plans = [(kind, number, count) for kind, count in _kinds(row) for number in range(count.n)]
+    kinds = (PlanKind.GOTO, row.goto), (PlanKind.PICKUP, row.pick), (PlanKind.PUT, row.put)
+    plans = [(kind, number, count) for kind, count in kinds for number in range(count.n)]
     for index, (kind, number, count) in enumerate(plans):
         ended = DONE if number < count.n_done else _NOT_DONE
         payload = PlanRecord(
@@ -104,7 +105,3 @@ def _records(row: LoggedPlans) -> Iterator[UnitRecord[PlanRecord]]:
             ),
             payload=payload,
         )
-
-
-def _kinds(row: LoggedPlans) -> tuple[tuple[PlanKind, PlanCount], ...]:
-    return (PlanKind.GOTO, row.goto), (PlanKind.PICKUP, row.pick), (PlanKind.PUT, row.put)
