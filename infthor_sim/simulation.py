@@ -3,10 +3,7 @@
 Each agent mode has its camera and arm.
 """
 
-import copyreg
-import io
-import pickle
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -18,13 +15,13 @@ from infthor_sim.arm.holding import drop_all
 from infthor_sim.arm.kinova import Kinova
 from infthor_sim.arm.rig import Rig
 from infthor_sim.arm.stretch import Stretch
-from infthor_sim.object_types import ObjectType, type_named
 from infthor_sim.objects import SimObject
 from infthor_sim.physics.crowd import set_agent_count
 from infthor_sim.physics.falling import let_fall
 from infthor_sim.pictures.cameras import ThirdPartyCamera
 from infthor_sim.pictures.views import Display, Views
 from infthor_sim.pictures.vision import AgentVision
+from infthor_sim.saved_state import SavedState
 from infthor_sim.scenes.catalogue import Catalogue
 from infthor_sim.settings import LOCOBOT, SimulatorSettings
 from infthor_sim.world import World
@@ -71,7 +68,7 @@ class Simulation:
         self.cameras.clear()
         self.object_filter = None
         self.random = np.random.default_rng(world.seed)
-        self._saved: dict[int, _SavedState] = {}
+        self._saved: dict[int, SavedState[tuple[World, np.random.Generator]]] = {}
         equip(world, self.settings.agent_mode)
         self.world = world
         self._show(world)
@@ -89,7 +86,7 @@ class Simulation:
 
     def save(self, slot: int) -> None:
         """Keep a copy of the scene's state and random numbers, in place of what the slot held."""
-        self._saved[slot] = _SavedState(self.world, self.random)
+        self._saved[slot] = SavedState((self.world, self.random))
 
     def restore(self, slot: int) -> bool:
         """Bring back a slot's state, which stays kept; return False if none is of this scene."""
@@ -180,27 +177,3 @@ def equip(world: World, agent_mode: str) -> None:
     camera = _CAMERAS.get(agent_mode, _USUAL)
     world.agent.eye, world.agent.crouch, world.agent.max_down = camera
     world.mark_changed()
-
-
-class _SavedState:
-    """A copy of a world and of the random numbers that its actions draw.
-
-    Pickled bytes are several times quicker to make and to read than copied objects.
-    """
-
-    def __init__(self, world: World, random: np.random.Generator) -> None:
-        buffer = io.BytesIO()
-        pickler = pickle.Pickler(buffer, protocol=pickle.HIGHEST_PROTOCOL)
-        pickler.dispatch_table = {**copyreg.dispatch_table, ObjectType: _reduce_type}
-        pickler.dump((world, random))
-        self._content = buffer.getvalue()
-
-    def copy(self) -> tuple[World, np.random.Generator]:
-        """Return the state anew; it shares nothing with earlier copies."""
-        world, random = pickle.loads(self._content)
-        return world, random
-
-
-def _reduce_type(record: ObjectType) -> tuple[Callable[[str], ObjectType], tuple[str]]:
-    """Have a type's record looked up again: it is never changed, so states can share it."""
-    return type_named, (record.name,)

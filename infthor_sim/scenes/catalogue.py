@@ -20,6 +20,7 @@ from infthor_sim.agent import AGENT_HEIGHT, Agent
 from infthor_sim.errors import DataError, in_one_line
 from infthor_sim.geometry import Array
 from infthor_sim.physics.navigation import NavGrid
+from infthor_sim.saved_state import SavedState
 from infthor_sim.scenes.floorplan import build_floor_plan
 from infthor_sim.scenes.procedural import SCENE_TYPES, build_scene
 from infthor_sim.scenes.supplement import Supplement, read_supplement
@@ -50,7 +51,7 @@ _KEY = '{"scene":"'  # the usual start of a line
 
 
 class Catalogue:
-    """Builds a new world for a scene name.
+    """Builds a new world for a scene name; the last one is kept, as a scene is often loaded again.
 
     Args:
         data: folder with recorded floor plans, see `FloorPlanData`; None for none.
@@ -63,10 +64,16 @@ class Catalogue:
         self._assets: dict[str, tuple[float, float, float]] | None = None
         self._supplement_path = supplement
         self._supplement: Mapping[str, Supplement] | None = None if supplement is not None else {}
+        self._last: tuple[str, SavedState[World]] | None = None
 
     def load(self, name: str) -> World:
         """Return the world of a scene name."""
         name = name.removesuffix("_physics")
+        if self._last is None or self._last[0] != name:
+            self._last = name, SavedState(self._build(name))
+        return self._last[1].copy()
+
+    def _build(self, name: str) -> World:
         if name == "Procedural":  # which the client loads before it creates a house
             return self.empty()
         if _FLOOR_PLAN.fullmatch(name):
