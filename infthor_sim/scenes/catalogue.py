@@ -51,7 +51,9 @@ _KEY = '{"scene":"'  # the usual start of a line
 
 
 class Catalogue:
-    """Builds a new world for a scene name; the last one is kept, as a scene is often loaded again.
+    """Builds a new world for a scene name.
+
+    The last procedural one is kept, as a scene is often loaded again.
 
     Args:
         data: folder with recorded floor plans, see `FloorPlanData`; None for none.
@@ -64,23 +66,18 @@ class Catalogue:
         self._assets: dict[str, tuple[float, float, float]] | None = None
         self._supplement_path = supplement
         self._supplement: Mapping[str, Supplement] | None = None if supplement is not None else {}
-        self._last: tuple[str, SavedState[World]] | None = None
+        self._last: tuple[tuple[str, int], SavedState[World]] | None = None
 
     def load(self, name: str) -> World:
         """Return the world of a scene name."""
         name = name.removesuffix("_physics")
-        if self._last is None or self._last[0] != name:
-            self._last = name, SavedState(self._build(name))
-        return self._last[1].copy()
-
-    def _build(self, name: str) -> World:
         if name == "Procedural":  # which the client loads before it creates a house
             return self.empty()
         if _FLOOR_PLAN.fullmatch(name):
             return self._floor_plan(name)
         procedural = _PROCEDURAL.fullmatch(name)
         if procedural and procedural[1] in SCENE_TYPES:
-            return build_scene(procedural[1], int(procedural[2]))
+            return self._procedural(procedural[1], int(procedural[2]))
         names = ", ".join(f"{scene_type}-<seed>" for scene_type in SCENE_TYPES)
         raise DataError(f"Scene {name!r} is unknown; use {names}, or FloorPlan<N> with --data")
 
@@ -108,6 +105,11 @@ class Catalogue:
         if self._assets is None:
             self._assets = {} if self._folder is None else read_asset_sizes(self._folder)
         return build_house(house, self._assets)
+
+    def _procedural(self, scene_type: str, seed: int) -> World:
+        if self._last is None or self._last[0] != (scene_type, seed):
+            self._last = (scene_type, seed), SavedState(build_scene(scene_type, seed))
+        return self._last[1].copy()
 
     def _floor_plan(self, name: str) -> World:
         if _ROBOTHOR.fullmatch(name) and (self._data is None or name not in self._data.scenes()):
