@@ -23,13 +23,8 @@ from infthor_eval.manipulation.worlds import ArmView, ArmWorld, arm_evaluation
 from model_adapters import ArmDelta
 
 _MOST = np.array((0.1, 0.1, 0.1, math.pi, math.pi, math.pi, 1.0))  # metres, radians, openness
-_SEMANTICS = spaces.ActionSemantics(
-    control_mode="eef_delta_pose",
-    rotation_repr="euler_xyz",
-    gripper="continuous",
-    frame="base",
-    dim_labels=("dx", "dy", "dz", "droll", "dpitch", "dyaw", "gripper"),
-)
+_LABELS = ("dx", "dy", "dz", "droll", "dpitch", "dyaw", "gripper")
+_MOVES_ALONE = (0, 1, 2, 6)  # the numbers of an arm whose hand does not turn
 _STATE = spaces.StateSpec(
     (
         spaces.StateField("eef_pos", (3,), "m"),
@@ -43,6 +38,7 @@ _DOCS = (
     "radians; a movement is at most 0.1 m long. The gripper is absolute: below 0.5 it closes "
     "around the target if that is in its sphere, else it opens and releases what it holds."
 )
+_DOCS_MOVES = _DOCS.replace("is absolute", "adds up, from 0 (closed) to 1 (open)")
 
 
 class EpisodeNotRun(PolicyError):
@@ -61,9 +57,21 @@ class InfthorArm:
     """
 
     def __init__(
-        self, task: str = "manipulathor_mini", data: str | None = None, cameras: str = "front"
+        self,
+        task: str = "manipulathor_mini",
+        data: str | None = None,
+        cameras: str = "front",
+        turns: bool = True,
     ) -> None:
-        """Find the episodes; arguments as `arm_evaluation`, ConfigError for a bad one."""
+        """Find the episodes.
+
+        Args:
+            task, data, cameras: as `arm_evaluation`; ConfigError for a bad one.
+            turns: whether actions turn the hand, and set the gripper. The agents of inspect-robots
+                take no angles, and only what a step changes: so without turns the gripper adds up.
+        """
+        self._turns = turns
+        self._openness = 1.0
         self.world = _world(task, data, cameras=cameras)
         self._task = task
         self._instruction: str | None = None
@@ -74,13 +82,13 @@ class InfthorArm:
         names = ("agentview", "wrist") if "wrist" in cameras else ("agentview",)
         self.info = EmbodimentInfo(
             name="infthor-arm",
-            action_space=spaces.Box(_MOST.shape, np.array((*-_MOST[:-1], 0.0)), _MOST, _SEMANTICS),
+            action_space=_action_space(turns),
             observation_space=spaces.ObservationSpace(
                 tuple(spaces.CameraSpec(name, size, size) for name in names), state=_STATE
             ),
             is_simulated=True,
             capabilities=_CAPABILITIES,
-            docs=_DOCS,
+            docs=_DOCS if turns else _DOCS_MOVES,
             environment_id="infthor-eval",
             environment_revision=__version__,
         )
@@ -97,16 +105,17 @@ class InfthorArm:
             )
         self._instruction = scene.instruction
         try:
-            return self._observation(self.world.reset(scene.id))
+            view = self.world.reset(scene.id)
         except InfthorError as error:
             raise EpisodeNotRun(str(error)) from error
+        self._openness = view.hand.gripper
+        return self._observation(view)
 
     def step(self, action: Action) -> StepResult:
-        """Execute seven numbers; raises EpisodeNotRun if the simulator is lost."""
+        """Execute an action's numbers; raises EpisodeNotRun if the simulator is lost."""
         numbers = np.asarray(action.data, dtype=np.float64).tolist()
-        delta = ArmDelta(tuple(numbers[:3]), tuple(numbers[3:6]), numbers[6])
         try:
-            view = self.world.step(delta)
+            view = self.world.step(self._delta(numbers))
         except InfthorError as error:
             raise EpisodeNotRun(str(error)) from error
         is_limit = view.ended is ArmEnded.LIMIT
@@ -124,6 +133,13 @@ class InfthorArm:
         """Stop the simulators."""
         self.world.close()
 
+    def _delta(self, numbers: list[float]) -> ArmDelta:
+        moved, gripper = tuple(numbers[:3]), numbers[-1]
+        if self._turns:
+            return ArmDelta(moved, tuple(numbers[3:6]), gripper)
+        self._openness = min(1.0, max(0.0, self._openness + gripper))
+        return ArmDelta(moved, (0.0, 0.0, 0.0), self._openness)
+
     def _observation(self, view: ArmView) -> Observation:
         state = {
             "eef_pos": np.array(view.hand.position),
@@ -131,6 +147,20 @@ class InfthorArm:
             "gripper": np.array([view.hand.gripper]),
         }
         return Observation(dict(view.images), state, self._instruction)
+
+
+def _action_space(turns: bool) -> spaces.Box:
+    told = list(range(len(_MOST)) if turns else _MOVES_ALONE)
+    semantics = spaces.ActionSemantics(
+        control_mode="eef_delta_pose" if turns else "eef_delta_pos",
+        rotation_repr="euler_xyz" if turns else "none",
+        gripper="continuous",
+        frame="base",
+        dim_labels=tuple(_LABELS[number] for number in told),
+    )
+    most = _MOST[told]
+    least = np.array((*-most[:-1], 0.0 if turns else -1.0))
+    return spaces.Box(most.shape, least, most, semantics)
 
 
 def _task(*, name: str, task: str, data: str | None = None, limit: int | None = None) -> Task:

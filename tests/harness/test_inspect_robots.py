@@ -5,6 +5,7 @@ import sys
 import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from infthor_eval.plugins import import_target
@@ -91,6 +92,46 @@ def test_policies_succeed_in_the_same_episodes_as_through_our_own_command(
         name for name, done in ours.items() if done
     }
     assert set(reasons.values()) <= {"success", "failure", "max_steps"}
+
+
+def test_an_arm_that_does_not_turn_adds_up_its_gripper(data, tmp_path, run_cli, policy, evaluate):
+    from inspect_robots.types import Action, ActionChunk
+
+    closing = [0.04, -0.01, 0.02, 0.0, 0.0, 0.0, 0.0]
+    (tmp_path / "closing.py").write_text(f"def act(image, instruction):\n    return {closing}\n")
+    name = f"{tmp_path / 'closing.py'}:act"
+    ours = own_successes(run_cli, model=name, tasks=PICKUP, data=data, out=tmp_path / "ours")
+    theirs = policy(name)
+    act = theirs.act
+
+    def act_by_changes(observation):
+        (action,) = act(observation).actions
+        return ActionChunk([Action(np.array([*action.data[:3], -1.0]))])
+
+    theirs.act = act_by_changes
+    assert successes(evaluate(theirs, turns=False)) == ours
+    assert any(ours.values())
+
+
+def test_their_agents_take_an_arm_that_does_not_turn(data):
+    from inspect_robots.types import Action
+
+    from infthor_eval.harness.inspect_robots import InfthorArm, pickup_task
+
+    arm = InfthorArm(PICKUP, str(data), turns=False)
+    space = arm.info.action_space
+    assert space.semantics.rotation_repr == "none"
+    assert space.semantics.dim_labels == ("dx", "dy", "dz", "gripper")
+    assert (space.low <= 0).all() and (space.high >= 0).all()
+    (scene, *_) = pickup_task(task=PICKUP, data=str(data)).scenes
+    given = []
+    arm.world.step = lambda delta: given.append(delta) or arm.world.reset(scene.id)
+    arm.reset(scene)
+    for change in (-0.3, -0.3, 0.1, 1.0, -1.0):
+        arm.step(Action(np.array([0.01, 0.0, 0.0, change])))
+    arm.close()
+    assert [delta.gripper for delta in given] == pytest.approx([0.7, 0.4, 0.5, 1.0, 0.0])
+    assert {delta.rotation for delta in given} == {(0.0, 0.0, 0.0)}
 
 
 def test_a_policy_is_shown_the_wrist_and_told_of_the_hand(policy, evaluate):
