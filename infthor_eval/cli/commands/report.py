@@ -12,6 +12,7 @@ from infthor_eval.cli.help import example_command
 from infthor_eval.cli.options.values import PATH, SET, WholeNumber
 from infthor_eval.cli.progress.notes import print_failure, print_note
 from infthor_eval.errors import UsageError
+from infthor_eval.report.web.progress import PageProgress
 from infthor_eval.storage.files import prepare_file, prepare_folder, require_writable
 from infthor_eval.terminal import error_console, print_line, progress_bar
 
@@ -193,7 +194,7 @@ def _runs_among(paths: Sequence[Path]) -> list[Path]:
     return runs
 
 
-class _PageBars:
+class _PageBars(PageProgress):
     """See `PageProgress`: a bar per piece of work on a terminal, lines elsewhere."""
 
     def __init__(self, progress: Progress) -> None:
