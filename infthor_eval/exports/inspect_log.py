@@ -13,7 +13,6 @@ from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
 
-from infthor_eval.errors import wrap_errors
 from infthor_eval.exports.gaps import (
     dataset_name,
     describe_gaps,
@@ -31,7 +30,7 @@ from infthor_eval.reasons import count_reasons
 from infthor_eval.report.sample import Sample, TokenCounts
 from infthor_eval.run import Run
 from infthor_eval.storage.digests import fingerprint
-from infthor_eval.storage.files import file_name, write_atomically, writing_hint
+from infthor_eval.storage.files import file_name, write_output, writing_hint
 
 _VERSION = 2  # of inspect_ai's logs
 _PROVIDERS = {"transformers": "hf", "vllm": "vllm"}  # its names of engines, which begin a model's
@@ -81,8 +80,7 @@ class _Log:
         summaries = []
         tokens: list[TokenCounts] = []
         with (
-            wrap_errors(f"{path}: cannot be written", writing_hint("")),
-            write_atomically(path) as partial,
+            write_output(path, writing_hint("")) as partial,
             zipfile.ZipFile(partial, "w") as archive,
         ):
             _add(archive, "_journal/start.json", start)

@@ -10,12 +10,10 @@ import click
 
 from infthor_eval.cli.help import example_command
 from infthor_eval.cli.options.values import PATH, FiniteFloat, default_option
-from infthor_eval.errors import UsageError, wrap_errors
-from infthor_eval.storage.files import file_name, prepare_file, write_atomically
+from infthor_eval.errors import UsageError
+from infthor_eval.storage.files import file_name, prepare_file, write_output
 
 if TYPE_CHECKING:
-    from PIL import Image
-
     from infthor_eval.report.presenter import Recording, Replay
     from infthor_eval.run import Run
     from infthor_eval.terminal import PlainConsole
@@ -149,7 +147,9 @@ def _write(
         bar = PacedBar(progress, recording.trajectory, n_frames)
         frames = _watch_frames(session.frames(recording.records), bar.advance, notes)
         if fps is None:
-            _write_sheet(path, replay.draw_sheet(frames, heading))
+            sheet = replay.draw_sheet(frames, heading)
+            with write_output(path, "give another --sheet") as partial:
+                sheet.save(partial, format="png")
             length = ""
         else:
             length = f", {write_animation(path, replay.pictures(frames, heading), fps) / fps:.0f} s"
@@ -165,11 +165,3 @@ def _watch_frames(
             notes.print(f"otherwise than recorded: {frame.note}")
         advance()
         yield frame
-
-
-def _write_sheet(path: Path, sheet: Image.Image) -> None:
-    with (
-        wrap_errors(f"{path}: cannot be written", "give another --sheet"),
-        write_atomically(path) as partial,
-    ):
-        sheet.save(partial, format="png")

@@ -20,8 +20,8 @@ from infthor_eval.cli.options.values import (
 )
 from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
 from infthor_eval.cli.progress.bar import PacedBar
-from infthor_eval.errors import UsageError, wrap_errors
-from infthor_eval.storage.files import hold_folder, prepare_file, refuse_overwrite, write_atomically
+from infthor_eval.errors import UsageError
+from infthor_eval.storage.files import hold_folder, prepare_file, refuse_overwrite, write_output
 from infthor_eval.terminal import console, error_console, print_line, progress_bar
 
 if TYPE_CHECKING:
@@ -182,10 +182,7 @@ def _write(out: Path, questions: Sequence[Question], overwrite: bool) -> None:
     content = encode_questions(questions)
     if not overwrite:
         refuse_overwrite(out, content)
-    with (
-        wrap_errors(f"{out}: cannot be written", "give another --out"),
-        write_atomically(out) as partial,
-    ):
+    with write_output(out, "give another --out") as partial:
         partial.write_bytes(content)
 
 
