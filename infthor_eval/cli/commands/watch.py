@@ -147,6 +147,7 @@ def _write(
         bar = PacedBar(progress, recording.trajectory, n_frames)
         frames = _watch_frames(session.frames(recording.records), bar.advance, notes)
         if fps is None:
+            assert replay.draw_sheet is not None  # or --sheet is refused
             sheet = replay.draw_sheet(frames, heading)
             with write_output(path, "give another --sheet") as partial:
                 sheet.save(partial, format="png")
