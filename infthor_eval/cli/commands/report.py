@@ -10,6 +10,7 @@ import click
 
 from infthor_eval.cli.help import example_command
 from infthor_eval.cli.options.values import PATH, SET, WholeNumber
+from infthor_eval.cli.progress.bar import PacedBar
 from infthor_eval.cli.progress.notes import print_failure, print_note
 from infthor_eval.errors import UsageError
 from infthor_eval.report.web.progress import PageProgress
@@ -19,7 +20,6 @@ from infthor_eval.terminal import error_console, print_line, progress_bar
 if TYPE_CHECKING:
     from rich.progress import Progress
 
-    from infthor_eval.cli.progress.bar import PacedBar
     from infthor_eval.report.presenter import FigureRequest
     from infthor_eval.report.web.build import PageRequest
 
@@ -202,8 +202,6 @@ class _PageBars(PageProgress):
         self._bars: dict[str, PacedBar] = {}
 
     def begin(self, what: str, n: int) -> None:
-        from infthor_eval.cli.progress.bar import PacedBar
-
         self._bars[what] = PacedBar(self._progress, what, n)
 
     def advance(self, what: str, detail: str = "") -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -90,7 +90,8 @@ def command(
     recording = replay.select(recorded, EpisodeSelection(task, trajectory, plans, episode, most))
     choice = [text.strip() for text in (plans, episode) if text is not None]
     parts = [recorded.label, *recording.tasks, recording.trajectory, *choice]
-    path = prepare_file(sheet or out or _default_file(parts))
+    # A file of its own for each choice.
+    path = prepare_file(sheet or out or _FOLDER / f"{file_name('-'.join(parts))}.mp4")
     rate = None if sheet is not None else fps
     _write(recorded, recording, path, data=data, scenes=scenes, fps=rate)
 
@@ -116,11 +117,6 @@ def _refuse_options(run: Run, replay: Replay, options: Mapping[str, object]) -> 
                 f"{option}: is not for runs of {run.suite.name}, and {run.folder} is one; leave it "
                 "out"
             )
-
-
-def _default_file(parts: Sequence[str]) -> Path:
-    """Return a file of its own for each choice."""
-    return _FOLDER / f"{file_name('-'.join(parts))}.mp4"
 
 
 def _write(
