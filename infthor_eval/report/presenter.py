@@ -130,18 +130,6 @@ class EpisodeSelection:
     most: int | None = None
 
 
-class ReplayFrame(Protocol):
-    """A state of a replayed episode: its start, or the result of a step."""
-
-    @property
-    def observation(self) -> Any:
-        """The world at that state, with `frame` (uint8 RGB array); None if nobody acted in it."""
-
-    @property
-    def note(self) -> str:
-        """How the replay differs from the recorded episode; empty if it does not."""
-
-
 class OpenReplay(Protocol):
     """A simulator in which recorded episodes of one trajectory are replayed."""
 
@@ -150,7 +138,11 @@ class OpenReplay(Protocol):
         """Number of episodes of the trajectory."""
 
     def frames(self, records: Sequence[Record], /) -> Iterator[Any]:
-        """Replay episodes and yield `ReplayFrame`s: the start of each, then one per step.
+        """Replay episodes and yield their states: the start of each, then one per step.
+
+        Each has `observation`, the world at that state, with `frame` (uint8 RGB array), which is
+        None if nobody acted in it; and `note`, how the replay differs from the recorded episode,
+        which is empty if it does not.
 
         Raises:
             InfthorError: an episode cannot be replayed.
