@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +10,7 @@ import click
 
 import infthor_eval
 from infthor_eval.cli.main import Program, run_program
-from infthor_eval.cli.options.values import PATH, default_option, split_names
+from infthor_eval.cli.options.values import PATH, default_option, split_names, together
 from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
 from infthor_eval.cli.progress.notes import NOTES, print_failure, print_note
 from infthor_eval.storage.files import hold_folder, prepare_file
@@ -34,34 +34,31 @@ def _infthor_board() -> None:
     """Check submissions of results, write a page of those that pass, and make secret sets."""
 
 
-def _checking_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add the options that both commands check by, and pass to `_check`."""
-    for option in (
-        click.option(
-            "--include-path", "include", multiple=True, type=PATH, help="Folder of task files."
-        ),
-        click.option(
-            "--allow",
-            metavar="CHECK,...",
-            help="Do not refuse by these checks, as you have looked.",
-        ),
-        click.option(
-            "--key",
-            type=PATH,
-            metavar="KEY",
-            help="Key of a private set, for runs on its public part.",
-        ),
-        click.option(
-            "--data",
-            "sets",
-            multiple=True,
-            type=PATH,
-            metavar="SET",
-            help="Set of tasks that have no bundled one; may be repeated.",
-        ),
-    ):
-        command = option(command)
-    return command
+# The options that both commands check by; they pass them to `_check`.
+_checking_options = together(
+    click.option(
+        "--data",
+        "sets",
+        multiple=True,
+        type=PATH,
+        metavar="SET",
+        help="Set of tasks that have no bundled one; may be repeated.",
+    ),
+    click.option(
+        "--key",
+        type=PATH,
+        metavar="KEY",
+        help="Key of a private set, for runs on its public part.",
+    ),
+    click.option(
+        "--allow",
+        metavar="CHECK,...",
+        help="Do not refuse by these checks, as you have looked.",
+    ),
+    click.option(
+        "--include-path", "include", multiple=True, type=PATH, help="Folder of task files."
+    ),
+)
 
 
 @_infthor_board.command("check", example="infthor-board check my_submission")
