@@ -9,7 +9,7 @@ that are known alone, and here a sample is in memory at a time, frames included.
 import json
 import zipfile
 from collections.abc import Mapping, Sequence
-from datetime import datetime, timedelta
+from datetime import timedelta
 from pathlib import Path
 from typing import Any
 
@@ -75,7 +75,8 @@ class _Log:
         if request.frames:
             find_frames = self._run.presenter.request_frames(self._run, request.data)
         writer = SampleWriter(_model_name(facts), self._measures, find_frames)
-        path = request.out / f"{_stamp(self._ran)}_{file_name(self._task)}_{self._id}.eval"
+        stamp = self._ran.isoformat(timespec="seconds").replace(":", "-")
+        path = request.out / f"{stamp}_{file_name(self._task)}_{self._id}.eval"
         start = {"version": _VERSION, "eval": self._spec(facts), "plan": self._plan()}
         summaries = []
         tokens: list[TokenCounts] = []
@@ -220,10 +221,6 @@ def _sum(tokens: Sequence[TokenCounts]) -> TokenCounts:
         sum(it.cached for it in tokens),
         sum(it.reply for it in tokens),
     )
-
-
-def _stamp(time: datetime) -> str:
-    return time.isoformat(timespec="seconds").replace(":", "-")
 
 
 def _add(archive: zipfile.ZipFile, name: str, document: Any) -> None:
