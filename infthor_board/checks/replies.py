@@ -265,7 +265,7 @@ def pairs_of_what_differs(case: Case) -> Iterator[str]:
     """Where both worlds were shown the same frames, greedy replies are the same: one request has
     one greedy reply: another one came from elsewhere."""
     for task in case.tasks:
-        if task.run.is_export or not _is_greedy(task):
+        if task.run.is_export or task.stated.decoding.get("temperature"):  # which samples
             continue
         alike = [pair for pair in find_pairs(task.graded)[0] if _is_alike(pair)]
         flipped = sum(is_flipped(*pair) for pair in alike)
@@ -320,16 +320,8 @@ def _together(case: Case) -> Iterator[tuple[Expected, Expected]]:
         for twins in case.shown:
             has_pairs = any(unit.payload.twin for unit in twins.units.values())
             is_plain = not any(unit.payload.twin for unit in plain.units.values())
-            if is_plain and has_pairs and _context(plain) == _context(twins):
+            if is_plain and has_pairs and plain.stated.context == twins.stated.context:
                 yield plain, twins
-
-
-def _context(task: Expected) -> str:
-    return task.run.header.config.tasks[task.name].context
-
-
-def _is_greedy(task: Expected) -> bool:
-    return not task.run.header.config.tasks[task.name].decoding.get("temperature")
 
 
 def _is_alike(pair: TwinRecords) -> bool:

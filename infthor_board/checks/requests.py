@@ -42,10 +42,10 @@ def _of_task(task: Expected) -> Iterator[str]:
 
 def _reasons(task: Expected) -> Counter[str]:
     assert task.config is not None
-    theirs = task.run.header.config.tasks[task.name]
-    if not isinstance(theirs.decoding.get("seed"), int):
+    decoding = task.stated.decoding
+    if not isinstance(decoding.get("seed"), int):
         return Counter({"its decoding has no seed": len(task.records)})
-    ours = replace(task.config, decoding=theirs.decoding)
+    ours = replace(task.config, decoding=decoding)
     config = replace(task.run.header.config, tasks={task.name: ours})
     reasons: Counter[str] = Counter()
     try:
