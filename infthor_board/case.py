@@ -32,19 +32,9 @@ class Case:
         """Tasks that were asked with their own frames."""
         return [task for task in self.tasks if task.run.header.config.frames in ("", SHOWN)]
 
-    def controls(self, frames: str) -> list[Expected]:
-        """Return tasks that were asked with this frame ablation."""
-        return [task for task in self.tasks if task.run.header.config.frames == frames]
 
-
-@dataclass(frozen=True)
-class Remark:
+class Remark(str):
     """What is to be known of a submission, and does not refuse it."""
-
-    text: str
-
-
-Reasons = Iterator[str | Remark]
 
 
 @dataclass(frozen=True)
@@ -57,18 +47,15 @@ class Check:
     """
 
     name: str
-    reasons: Callable[[Case], Reasons]
+    reasons: Callable[[Case], Iterator[str]]
 
     def problems(self, case: Case) -> Iterator[Problem]:
         """Yield the reasons under the name of the check."""
         for reason in self.reasons(case):
-            if isinstance(reason, Remark):
-                yield Problem(self.name, reason.text, is_warning=True)
-            else:
-                yield Problem(self.name, reason)
+            yield Problem(self.name, str(reason), is_warning=isinstance(reason, Remark))
 
 
-def check(name: str) -> Callable[[Callable[[Case], Reasons]], Check]:
+def check(name: str) -> Callable[[Callable[[Case], Iterator[str]]], Check]:
     """Make a check of a function that yields its reasons."""
     return partial(Check, name)
 

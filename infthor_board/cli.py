@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +10,7 @@ import click
 
 import infthor_eval
 from infthor_eval.cli.main import Program, run_program
-from infthor_eval.cli.options.values import PATH, default_option, split_names
+from infthor_eval.cli.options.values import PATH, default_option, split_names, together
 from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
 from infthor_eval.cli.progress.notes import NOTES, print_failure, print_note
 from infthor_eval.storage.files import hold_folder, prepare_file
@@ -34,34 +34,31 @@ def _infthor_board() -> None:
     """Check submissions of results, write a page of those that pass, and make secret sets."""
 
 
-def _checking_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add the options that both commands check by."""
-    for option in (
-        click.option(
-            "--include-path", "include", multiple=True, type=PATH, help="Folder of task files."
-        ),
-        click.option(
-            "--allow",
-            metavar="CHECK,...",
-            help="Do not refuse by these checks, as you have looked.",
-        ),
-        click.option(
-            "--key",
-            type=PATH,
-            metavar="KEY",
-            help="Key of a private set, for runs on its public part.",
-        ),
-        click.option(
-            "--data",
-            "sets",
-            multiple=True,
-            type=PATH,
-            metavar="SET",
-            help="Set of tasks that have no bundled one; may be repeated.",
-        ),
-    ):
-        command = option(command)
-    return command
+# The options that both commands check by; they pass them to `_check`.
+_checking_options = together(
+    click.option(
+        "--data",
+        "sets",
+        multiple=True,
+        type=PATH,
+        metavar="SET",
+        help="Set of tasks that have no bundled one; may be repeated.",
+    ),
+    click.option(
+        "--key",
+        type=PATH,
+        metavar="KEY",
+        help="Key of a private set, for runs on its public part.",
+    ),
+    click.option(
+        "--allow",
+        metavar="CHECK,...",
+        help="Do not refuse by these checks, as you have looked.",
+    ),
+    click.option(
+        "--include-path", "include", multiple=True, type=PATH, help="Folder of task files."
+    ),
+)
 
 
 @_infthor_board.command("check", example="infthor-board check my_submission")
@@ -74,15 +71,7 @@ def _checking_options(command: Callable[..., Any]) -> Callable[..., Any]:
 )
 @_checking_options
 @click.option("--json", "as_json", is_flag=True, help="Print the verdicts as JSON, one a line.")
-def check(
-    folder: Path,
-    others: Path | None,
-    sets: tuple[Path, ...],
-    key: Path | None,
-    allow: str | None,
-    include: tuple[Path, ...],
-    as_json: bool,
-) -> int:
+def check(folder: Path, others: Path | None, as_json: bool, **checking: Any) -> int:
     """Check submissions before they are believed (docs/submit.md).
 
     FOLDER is a submission: `submission.yaml` beside runs, or beside exports of them; or a folder of
@@ -91,7 +80,7 @@ def check(
     """
     import msgspec
 
-    verdicts = _check(folder, sets, key, allow, include, others)
+    verdicts = _check(folder, others, **checking)
     for verdict in verdicts:
         lines = [msgspec.json.encode(_document(verdict)).decode()] if as_json else _lines(verdict)
         for line in lines:
@@ -105,16 +94,7 @@ def check(
 @click.option("--title", default=_TITLE, show_default=True, help="Title of the page.")
 @click.option("--no-published", is_flag=True, help="Leave out the published rows of the paper.")
 @_checking_options
-def page(
-    folder: Path,
-    out: Path,
-    title: str,
-    no_published: bool,
-    sets: tuple[Path, ...],
-    key: Path | None,
-    allow: str | None,
-    include: tuple[Path, ...],
-) -> int:
+def page(folder: Path, out: Path, title: str, no_published: bool, **checking: Any) -> int:
     """Write a page of the submissions that pass `check`.
 
     FOLDER is as for `check`; the page is one file that loads nothing. Submissions that are refused
@@ -124,7 +104,7 @@ def page(
     from infthor_board.rows import published_rows, rows_of
 
     prepare_file(out)
-    verdicts = _check(folder, sets, key, allow, include)
+    verdicts = _check(folder, None, **checking)
     rows: list[LeaderboardRow] = []
     n_refused = 0
     for verdict in verdicts:
@@ -207,11 +187,12 @@ def private_set(
 
 def _check(
     folder: Path,
+    others: Path | None,
+    *,
     sets: Sequence[Path],
     key: Path | None,
     allow: str | None,
     include: Sequence[Path],
-    others: Path | None = None,
 ) -> list[Verdict]:
     from infthor_board.checking import CHECKS, check_submissions
     from infthor_board.expected import Owner

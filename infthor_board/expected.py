@@ -58,6 +58,11 @@ class Expected:
         return self.data if self.key is None else self.key.data
 
     @property
+    def stated(self) -> NiehTaskConfig:
+        """What the run says of the task."""
+        return self.run.header.config.tasks[self.name]
+
+    @property
     def records(self) -> list[Record]:
         """The submitted records of the task."""
         return [record for record in self.run.records if record.task == self.name]
@@ -76,9 +81,8 @@ class Expected:
         if self.key is None:
             return unit
         key = self.key
-        context = self.run.header.config.tasks[self.name].context
         question = key.question(unit.key.id)
-        knowledge = visible_knowledge(context)
+        knowledge = visible_knowledge(self.stated.context)
         return dataclasses.replace(
             unit,
             cluster=question.cluster,

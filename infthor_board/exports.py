@@ -154,7 +154,7 @@ def read_exported_means(samples: Path) -> Means:
     else:
         return {}
     document = read_json(path, _HINT_ON_MEANS) if path.is_file() else {}
-    return dict(read(document)) if isinstance(document, Mapping) else {}
+    return dict(read(_mapping(document)))
 
 
 def _means_of_every_eval_ever(
@@ -162,19 +162,16 @@ def _means_of_every_eval_ever(
 ) -> Iterator[tuple[tuple[str, str], float]]:
     results = document.get("evaluation_results")
     for result in results if isinstance(results, list) else []:
-        if not isinstance(result, Mapping):
-            continue
-        task, _, metric = str(result.get("evaluation_result_id")).rpartition("/")
-        details = result.get("score_details")
-        score = _stated_score(details.get("score") if isinstance(details, Mapping) else None)
+        stated = _mapping(result)
+        task, _, metric = str(stated.get("evaluation_result_id")).rpartition("/")
+        score = _stated_score(_mapping(stated.get("score_details")).get("score"))
         if metric in SCORERS and score is not None:
             yield (task, metric), score
 
 
 def _means_of_lm_eval(document: Mapping[str, Any]) -> Iterator[tuple[tuple[str, str], float]]:
-    results = document.get("results")
-    for task, values in results.items() if isinstance(results, Mapping) else ():
+    for task, values in _mapping(document.get("results")).items():
         for metric in SCORERS:
-            stated = values.get(f"{metric},none") if isinstance(values, Mapping) else None
-            if (score := _stated_score(stated)) is not None:
+            score = _stated_score(_mapping(values).get(f"{metric},none"))
+            if score is not None:
                 yield (str(task), metric), score

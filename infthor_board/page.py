@@ -2,10 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from infthor_eval.pages.one_file import LOOK, THEME, read_part, write_page_file
 from infthor_eval.rates import Rate
+
+_read = partial(read_part, __package__)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,10 +103,6 @@ def write_leaderboard(
         script=[THEME, _read("page.js")],
         filters={"percent": _percent, "interval": _interval, "number": _number},
     )
-
-
-def _read(name: str) -> str:
-    return read_part(__package__, name)
 
 
 def _percent(rate: Rate | None) -> str:

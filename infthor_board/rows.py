@@ -77,8 +77,8 @@ def _above(task: Expected) -> Rate | None:
 
 def _shown(task: Expected) -> str:
     config = task.run.header.config
-    context = config.tasks[task.name].context
-    memory = config.tasks[task.name].memory
+    context = task.stated.context
+    memory = task.stated.memory
     parts = [_CONTEXTS.get(context, context.replace("_", " "))]
     if memory is not None:
         parts.append(memory.name)

@@ -40,10 +40,7 @@ def load_run(folder: str | os.PathLike[str]) -> DataFrame:
         DataError: there is no journal in the folder, or one with a bad line, or of another format.
         UsageError: the suite of the run is not known here.
     """
-    # By name: every module imports this one, and few need pandas.
-    from infthor_eval.plugins import import_target
-
-    frame: DataFrame = import_target("infthor_eval.report.sample_table:load_run")(folder)
+    frame: DataFrame = _call("infthor_eval.report.sample_table:load_run", folder)
     return frame
 
 
@@ -63,9 +60,7 @@ def load_runs(*folders: str | os.PathLike[str]) -> DataFrame:
     Raises:
         DataError: there is no such folder, or it cannot be searched.
     """
-    from infthor_eval.plugins import import_target
-
-    frame: DataFrame = import_target("infthor_eval.report.run_table:load_runs")(*folders)
+    frame: DataFrame = _call("infthor_eval.report.run_table:load_runs", *folders)
     return frame
 
 
@@ -87,9 +82,7 @@ def load_sample(
         DataError: the run cannot be read.
         UsageError: there is no such sample.
     """
-    from infthor_eval.plugins import import_target
-
-    return import_target("infthor_eval.report.sample:load_sample")(folder, name, data)
+    return _call("infthor_eval.report.sample:load_sample", folder, name, data)
 
 
 def load_figure(
@@ -110,10 +103,9 @@ def load_figure(
         UsageError: there is no such figure, or not of these runs.
         DataError: a run or the file of panels cannot be read.
     """
-    from infthor_eval.plugins import import_target
-
-    build = import_target("infthor_eval.report.named_figures:load_figure")
-    figure: Figure = build(folders, name, task, panels)
+    figure: Figure = _call(
+        "infthor_eval.report.named_figures:load_figure", folders, name, task, panels
+    )
     return figure
 
 
@@ -135,11 +127,17 @@ def evaluate(model: Any, tasks: str | list[str], **options: Any) -> DataFrame:
         UsageError: an option or a name is unknown, or a value is not valid.
         InfthorError: as the command would say in one line.
     """
+    given = {"tasks": tasks, **options}
+    frame: DataFrame = _call("infthor_eval.cli.evaluation:evaluate", model, given)
+    return frame
+
+
+def _call(target: str, *arguments: Any) -> Any:
+    """Call what "module:name" names, by name as every module imports this one, and few need
+    pandas."""
     from infthor_eval.plugins import import_target
 
-    run = import_target("infthor_eval.cli.evaluation:evaluate")
-    frame: DataFrame = run(model, {"tasks": tasks, **options})
-    return frame
+    return import_target(target)(*arguments)
 
 
 def __getattr__(name: str) -> Any:

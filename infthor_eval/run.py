@@ -37,6 +37,7 @@ from infthor_eval.suites import find_presenter, find_suite
 if TYPE_CHECKING:
     from infthor_eval.rates import Rate
     from infthor_eval.report.plain import PlainPresenter
+    from infthor_eval.runs.results import Stored
     from infthor_eval.runs.suite import Suite
 
 _INCOMPLETE = " (incomplete)"  # ends the name of a run that is not whole
@@ -102,6 +103,13 @@ class Run:
         run.own_header = summary.header
         run._summed_up = summary.summary
         return run
+
+    @classmethod
+    def just_stored(cls, stored: Stored[Any], suite: Suite[Any, Any]) -> Self:
+        """Return a run that this process has just stored; see `held`."""
+        return cls.held(
+            stored.folder, suite, stored.summary, stored.records, stored.usage, stored.n_missing
+        )
 
     def named(self, name: str) -> Self:
         """Return the run by a name that it has beside others."""

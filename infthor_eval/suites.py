@@ -73,22 +73,17 @@ _BUILT_IN = {
         ("planner", "random", "scripted", "history", "recall"),
     ),
 }
-_DOCS = "docs/own-tasks.md"
-_SUITES = PluginTable(
-    "suite", "infthor_eval.suites", {name: kind.suite for name, kind in _BUILT_IN.items()}, _DOCS
-)
-_PRESENTERS = PluginTable(
-    "presenter",
-    "infthor_eval.presenters",
-    {name: kind.presenter for name, kind in _BUILT_IN.items()},
-    _DOCS,
-)
-_REQUESTS = PluginTable(
-    "lm-eval adapter of suite",
-    "infthor_eval.lm_eval",
-    {name: kind.requests for name, kind in _BUILT_IN.items()},
-    _DOCS,
-)
+
+
+def _table_of(part: str, kind: str, group: str) -> PluginTable:
+    """Return the table of one part of all suites; `kind` and `group` as in `PluginTable`."""
+    built_in = {name: getattr(suite, part) for name, suite in _BUILT_IN.items()}
+    return PluginTable(kind, group, built_in, "docs/own-tasks.md")
+
+
+_SUITES = _table_of("suite", "suite", "infthor_eval.suites")
+_PRESENTERS = _table_of("presenter", "presenter", "infthor_eval.presenters")
+_REQUESTS = _table_of("requests", "lm-eval adapter of suite", "infthor_eval.lm_eval")
 
 
 def suite_names() -> tuple[str, ...]:

@@ -16,13 +16,8 @@ from rich.text import Text
 from infthor_eval.errors import OutputClosed
 
 _KEPT = "\n\t"
-_HIDDEN = {
-    "Cc",
-    "Cf",
-    "Cs",
-    "Zl",
-    "Zp",
-}  # control, reordering or hiding, lone surrogates, line separators
+# Control, reordering or hiding, lone surrogates, line separators.
+_HIDDEN = {"Cc", "Cf", "Cs", "Zl", "Zp"}
 
 
 def printable(text: str) -> str:

@@ -17,7 +17,7 @@ from infthor_eval.errors import DataError, UsageError
 from infthor_eval.nieh.records import RECORDS
 from infthor_eval.report.sample_columns import ENVELOPE
 from infthor_eval.report.sample_table import encode_samples, sample_table
-from infthor_eval.report.suites.episode_columns import ARM_COLUMNS, PLAN_COLUMNS
+from infthor_eval.report.suites.episodes import ARM_COLUMNS, PLAN_COLUMNS
 from infthor_eval.report.suites.nieh_columns import NIEH_COLUMNS
 from infthor_eval.run import open_runs
 from infthor_eval.runs import UnitRecord

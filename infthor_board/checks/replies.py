@@ -12,7 +12,7 @@ from itertools import pairwise
 
 import scipy.stats
 
-from infthor_board.case import Case, Reasons, Remark, check
+from infthor_board.case import Case, Remark, check
 from infthor_board.expected import Expected
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.nieh.guessing.blind import questions_by_file, sample_on_clues
@@ -265,7 +265,7 @@ def pairs_of_what_differs(case: Case) -> Iterator[str]:
     """Where both worlds were shown the same frames, greedy replies are the same: one request has
     one greedy reply: another one came from elsewhere."""
     for task in case.tasks:
-        if task.run.is_export or not _is_greedy(task):
+        if task.run.is_export or task.stated.decoding.get("temperature"):  # which samples
             continue
         alike = [pair for pair in find_pairs(task.graded)[0] if _is_alike(pair)]
         flipped = sum(is_flipped(*pair) for pair in alike)
@@ -320,16 +320,8 @@ def _together(case: Case) -> Iterator[tuple[Expected, Expected]]:
         for twins in case.shown:
             has_pairs = any(unit.payload.twin for unit in twins.units.values())
             is_plain = not any(unit.payload.twin for unit in plain.units.values())
-            if is_plain and has_pairs and _context(plain) == _context(twins):
+            if is_plain and has_pairs and plain.stated.context == twins.stated.context:
                 yield plain, twins
-
-
-def _context(task: Expected) -> str:
-    return task.run.header.config.tasks[task.name].context
-
-
-def _is_greedy(task: Expected) -> bool:
-    return not task.run.header.config.tasks[task.name].decoding.get("temperature")
 
 
 def _is_alike(pair: TwinRecords) -> bool:
@@ -345,7 +337,7 @@ def _is_first_right(task: Expected, pair: TwinRecords) -> bool:
 
 
 @check("above blind")
-def not_above_blind(case: Case) -> Reasons:
+def not_above_blind(case: Case) -> Iterator[str]:
     """The score is above that of `blind`, which sees no frame: a score that is had without a frame
     shows no memory."""
     for task in case.shown:
@@ -360,10 +352,10 @@ def _is_above_blind(task: Expected) -> bool:
 
 
 @check("above other home")
-def not_above_other_home(case: Case) -> Reasons:
+def not_above_other_home(case: Case) -> Iterator[str]:
     """The score is above that on another home of the same kind: knowledge of homes looks like
     memory of this one."""
-    controls = {task.name: task for task in case.controls(OTHER)}
+    controls = {it.name: it for it in case.tasks if it.run.header.config.frames == OTHER}
     for task in case.shown:
         control = controls.get(task.name)
         if control is None:

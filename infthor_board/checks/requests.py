@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 from msgspec.structs import replace
 
-from infthor_board.case import Case, Reasons, Remark, check
+from infthor_board.case import Case, Remark, check
 from infthor_board.expected import Expected
 from infthor_eval.errors import InfthorError
 from infthor_eval.nieh.contexts import MEMORY, RETRIEVED
@@ -13,7 +13,7 @@ from infthor_eval.nieh.rescoring.rebuilt_requests import RequestRebuilder
 
 
 @check("frames")
-def same_requests(case: Case) -> Reasons:
+def same_requests(case: Case) -> Iterator[str]:
     """The hash of each request is that of our frames, words and decoding: a reply counts for the
     frames that were shown, and for no others."""
     for task in case.tasks:
@@ -42,10 +42,10 @@ def _of_task(task: Expected) -> Iterator[str]:
 
 def _reasons(task: Expected) -> Counter[str]:
     assert task.config is not None
-    theirs = task.run.header.config.tasks[task.name]
-    if not isinstance(theirs.decoding.get("seed"), int):
+    decoding = task.stated.decoding
+    if not isinstance(decoding.get("seed"), int):
         return Counter({"its decoding has no seed": len(task.records)})
-    ours = replace(task.config, decoding=theirs.decoding)
+    ours = replace(task.config, decoding=decoding)
     config = replace(task.run.header.config, tasks={task.name: ours})
     reasons: Counter[str] = Counter()
     try:

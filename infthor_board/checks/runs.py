@@ -131,10 +131,10 @@ def same_set(case: Case) -> Iterator[str]:
     for task in case.tasks:
         if task.config is None:
             continue
-        theirs = task.run.header.config.tasks[task.name]
-        if theirs.data != task.config.data:
+        theirs = task.stated.data
+        if theirs != task.config.data:
             yield (
-                f"{task.name}: was asked on a set with fingerprint {theirs.data[:12]}; that of "
+                f"{task.name}: was asked on a set with fingerprint {theirs[:12]}; that of "
                 f"{task.data.root.name} is {task.config.data[:12]}; run it on that set"
             )
 
@@ -146,8 +146,8 @@ def same_task(case: Case) -> Iterator[str]:
     for task in case.tasks:
         if task.config is None:
             continue
-        theirs = task.run.header.config.tasks[task.name]
         ours = task.config
+        theirs = task.stated
         differing = [
             name
             for name in ("dataset_kwargs", "doc_to_text", "doc_to_image", "process_docs")
@@ -180,7 +180,7 @@ def _left_out(task: Expected) -> Iterator[str]:
         yield f"{task.name}: was run with --limit {limit}; run it whole"
     if task.config is not None:
         ours = {(it.question_id, it.variant) for it in task.config.skipped}
-        skipped = task.run.header.config.tasks[task.name].skipped
+        skipped = task.stated.skipped
         left_out = [it.question_id for it in skipped if (it.question_id, it.variant) not in ours]
         if left_out:
             yield (
@@ -230,7 +230,7 @@ def asked_once(case: Case) -> Iterator[str]:
 def _run_settings(task: Expected) -> tuple[str, ...]:
     """Return task, context, frames and memory, of which a submission has one run each."""
     config = task.run.header.config
-    kwargs = canonical_json(dict(config.tasks[task.name].dataset_kwargs))
+    kwargs = canonical_json(dict(task.stated.dataset_kwargs))
     memory = (config.memory, config.memory_args, config.budget, config.prompt)
     return task.name, config.frames or SHOWN, kwargs, *map(str, memory)
 
@@ -271,8 +271,7 @@ def same_scorers(case: Case) -> Iterator[str]:
     """The metrics of a run are those of its installed task: a scorer of one's own under our
     scorers' names."""
     for task in case.tasks:
-        theirs = task.run.header.config.tasks[task.name].metrics
-        if task.config is not None and _code(theirs) != _code(task.config.metrics):
+        if task.config is not None and _code(task.stated.metrics) != _code(task.config.metrics):
             yield (
                 f"{task.name}: was scored by other scorers than the installed task's; run that task"
             )

@@ -80,7 +80,8 @@ class _RunExport:
 
     def write(self) -> list[Path]:
         """Write both files; returns their paths."""
-        place = Path("data", self._collection, *map(_part, _names(self._facts)))
+        names = (self._facts.developer, self._facts.short_name.replace("/", "_"))
+        place = Path("data", self._collection, *map(_part, names))
         folder = self._request.out / place
         name = str(self._uuid)
         samples = folder / f"{name}_samples.jsonl"
@@ -201,8 +202,8 @@ class _RunExport:
         return {
             "score": estimate.mean,
             "details": {
-                "is_primary": _text(measure.is_primary),
-                "is_whole": _text(gaps.is_whole),
+                "is_primary": json.dumps(measure.is_primary),
+                "is_whole": json.dumps(gaps.is_whole),
                 "left_out": describe_gaps(gaps) or "nothing",
                 "n_trajectories": str(estimate.n_clusters),
                 "n_not_attempted": UNKNOWN if gaps.n_missing is None else str(gaps.n_missing),
@@ -266,10 +267,6 @@ def _generation_config(run: Run, task: str) -> Document:
     }
 
 
-def _names(facts: ModelFacts) -> tuple[str, str]:
-    return facts.developer, facts.short_name.replace("/", "_")
-
-
 def _part(name: str) -> str:
     """Return a part of a path that its validator takes: no `data`, no dot at the end."""
     part = file_name(name)
@@ -284,10 +281,6 @@ def _bound(value: float) -> float | str:
 
 def _if_told(name: str, value: str | None) -> Document:
     return {name: value} if value else {}
-
-
-def _text(value: bool) -> str:
-    return "true" if value else "false"
 
 
 def _write_lines(path: Path, rows: Iterable[Document]) -> tuple[int, str]:

@@ -9,11 +9,10 @@ that are known alone, and here a sample is in memory at a time, frames included.
 import json
 import zipfile
 from collections.abc import Mapping, Sequence
-from datetime import datetime, timedelta
+from datetime import timedelta
 from pathlib import Path
 from typing import Any
 
-from infthor_eval.errors import wrap_errors
 from infthor_eval.exports.gaps import (
     dataset_name,
     describe_gaps,
@@ -31,7 +30,7 @@ from infthor_eval.reasons import count_reasons
 from infthor_eval.report.sample import Sample, TokenCounts
 from infthor_eval.run import Run
 from infthor_eval.storage.digests import fingerprint
-from infthor_eval.storage.files import file_name, write_atomically, writing_hint
+from infthor_eval.storage.files import file_name, write_output, writing_hint
 
 _VERSION = 2  # of inspect_ai's logs
 _PROVIDERS = {"transformers": "hf", "vllm": "vllm"}  # its names of engines, which begin a model's
@@ -76,13 +75,13 @@ class _Log:
         if request.frames:
             find_frames = self._run.presenter.request_frames(self._run, request.data)
         writer = SampleWriter(_model_name(facts), self._measures, find_frames)
-        path = request.out / f"{_stamp(self._ran)}_{file_name(self._task)}_{self._id}.eval"
+        stamp = self._ran.isoformat(timespec="seconds").replace(":", "-")
+        path = request.out / f"{stamp}_{file_name(self._task)}_{self._id}.eval"
         start = {"version": _VERSION, "eval": self._spec(facts), "plan": self._plan()}
         summaries = []
         tokens: list[TokenCounts] = []
         with (
-            wrap_errors(f"{path}: cannot be written", writing_hint("")),
-            write_atomically(path) as partial,
+            write_output(path, writing_hint("")) as partial,
             zipfile.ZipFile(partial, "w") as archive,
         ):
             _add(archive, "_journal/start.json", start)
@@ -222,10 +221,6 @@ def _sum(tokens: Sequence[TokenCounts]) -> TokenCounts:
         sum(it.cached for it in tokens),
         sum(it.reply for it in tokens),
     )
-
-
-def _stamp(time: datetime) -> str:
-    return time.isoformat(timespec="seconds").replace(":", "-")
 
 
 def _add(archive: zipfile.ZipFile, name: str, document: Any) -> None:

@@ -20,6 +20,7 @@ from infthor_eval.report.sample import Sample, TokenCounts
 from infthor_eval.runs import StoredFrames
 
 Document = dict[str, Any]
+_ERROR = ("message", "traceback", "traceback_ansi")  # which have the reason each
 FindFrames = Callable[[Any], Sequence[FrameRef]]
 
 
@@ -61,7 +62,7 @@ class SampleWriter:
             "messages": messages,
             "output": self._output(replies, usage, record.seconds),
             "scores": {
-                metric: self._score(sample, score)
+                metric: {"value": score, "answer": sample.reply}
                 for metric, score in self._scores.get((name, record.repeat), {}).items()
             },
             "metadata": {**facts_of(sample), "payload": msgspec.json.decode(payload_of(sample))},
@@ -71,7 +72,7 @@ class SampleWriter:
             "attachments": attachments,
         }
         if record.failure is not None:
-            document["error"] = _error(record.failure)
+            document["error"] = dict.fromkeys(_ERROR, record.failure)
         return document
 
     def _asked(self, sample: Sample, attachments: dict[str, str]) -> Document:
@@ -135,9 +136,6 @@ class SampleWriter:
         choices = [{"message": message, "stop_reason": "stop"} for message in replies[-1:]]
         return {"model": self._model, "choices": choices, "usage": usage, "time": seconds}
 
-    def _score(self, sample: Sample, score: float) -> Document:
-        return {"value": score, "answer": sample.reply}
-
 
 def sample_summary(document: Mapping[str, Any]) -> Document:
     """Return what inspect's list of samples needs of a sample."""
@@ -178,15 +176,11 @@ def _attach(frame: FrameRef | None, attachments: dict[str, str]) -> Document:
     """Return the part of a message that shows a frame; empty if there is none."""
     if frame is None:
         return {}
-    uri = _data_uri(frame)
+    content, media_type = frame.encoded()
+    uri = f"data:{media_type};base64,{b64encode(content).decode()}"
     name = hashlib.md5(uri.encode(), usedforsecurity=False).hexdigest()
     attachments[name] = uri
     return {"type": "image", "image": f"attachment://{name}", "detail": "auto"}
-
-
-def _data_uri(frame: FrameRef) -> str:
-    content, media_type = frame.encoded()
-    return f"data:{media_type};base64,{b64encode(content).decode()}"
 
 
 def _text(text: str) -> Document:
@@ -208,7 +202,3 @@ def _content(sample: Sample) -> str | list[Document]:
     if sample.thinking is None:
         return sample.reply
     return [{"type": "reasoning", "reasoning": sample.thinking}, _text(sample.reply)]
-
-
-def _error(reason: str) -> Document:
-    return {"message": reason, "traceback": reason, "traceback_ansi": reason}

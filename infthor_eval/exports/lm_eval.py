@@ -18,7 +18,7 @@ from infthor_eval.errors import wrap_errors
 from infthor_eval.exports import LM_EVAL_MODEL
 from infthor_eval.report.sample import Sample
 from infthor_eval.run import Run
-from infthor_eval.runs import RunOutcome, TaskFile, UnitCounts, UnitDoc, UnitRecord
+from infthor_eval.runs import RunOutcome, TaskFile, UnitCounts, UnitDoc
 from infthor_eval.runs.journals.shards import last_change
 from infthor_eval.statistics import clustered_mean
 from infthor_eval.storage.digests import canonical_json
@@ -140,8 +140,11 @@ def _tasks(outcome: RunOutcome[Any, Any]) -> list[_Task]:
     }
     for record, doc in zip(outcome.records, outcome.docs, strict=True):
         if record.excluded is None:
+            row = _row(doc)
+            if record.failure is not None:
+                row["failure"] = record.failure  # why there is no reply; a key of our own
             tasks[record.task].samples.append(Sample(run, record))
-            tasks[record.task].rows.append(_row(doc) | _failure(record))
+            tasks[record.task].rows.append(row)
     return [task for task in tasks.values() if task.samples]
 
 
@@ -193,11 +196,6 @@ def _row(unit: UnitDoc) -> dict[str, Any]:
         "prompt_hash": _hash(unit.prompt),
         "target_hash": _hash(unit.target),
     }
-
-
-def _failure(record: UnitRecord[Any]) -> dict[str, Any]:
-    """Return why a unit has no reply, under a key of our own."""
-    return {} if record.failure is None else {"failure": record.failure}
 
 
 def _hash(text: str) -> str:

@@ -9,9 +9,8 @@ from typing import Any
 from jinja2 import Environment, StrictUndefined, Template
 from markupsafe import Markup
 
-from infthor_eval.errors import wrap_errors
 from infthor_eval.pages.policy import file_policy
-from infthor_eval.storage.files import write_atomically
+from infthor_eval.storage.files import write_output
 
 
 def read_part(package: str, name: str) -> str:
@@ -54,10 +53,7 @@ def write_page_file(
         policy=Markup(file_policy(style=css, script=js, images=images)),
     )
     encoded = text.encode("utf-8", "backslashreplace")
-    with (
-        wrap_errors(f"{path}: cannot be written", "give another --out"),
-        write_atomically(path) as partial,
-    ):
+    with write_output(path, "give another --out") as partial:
         partial.write_bytes(encoded)
     return len(encoded)
 

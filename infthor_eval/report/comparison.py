@@ -114,11 +114,6 @@ class _PairedScores:
         """Names of the scores that the unit has in both runs."""
         return [name for name in self.first[0] if name in self.second[0]]
 
-    @property
-    def is_scored(self) -> bool:
-        """Whether the unit has a result in both runs."""
-        return bool(self.first[0] and self.second[0])
-
 
 @dataclass(frozen=True)
 class _TaskComparison:
@@ -155,7 +150,7 @@ class _TaskComparison:
         further = [unit.scores(self.presenter.extra_scores) for unit in units]
         scored = []
         for unit, scores in zip(units, further, strict=True):
-            if unit.scores(suite.scores).is_scored:
+            if suite.scores(unit.first[0]) and suite.scores(unit.second[0]):
                 scored.append(scores)
         names: dict[str, None] = {}
         for scores in scored or further:

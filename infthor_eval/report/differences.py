@@ -164,11 +164,8 @@ def compare_questions(first: Run, second: Run) -> Compared:
             f"{first.folder} and {second.folder} share no question of one task with a result in "
             "both; explain runs of the same questions"
         )
-    carried = _Carried(
-        len(shared[0]),
-        (fmean(shared[0]), fmean(shared[1])),
-        (len(scores[0]), len(scores[1])),
-    )
+    means = fmean(shared[0]), fmean(shared[1])
+    n_answered = len(scores[0]), len(scores[1])
     differences = []
     for pair, both in zip(pairs, answers, strict=True):
         effects = _effects(runs, pair, both)
@@ -177,8 +174,8 @@ def compare_questions(first: Run, second: Run) -> Compared:
             assert record is not None
             possible = _unexplained(pair, effects)
             title = first.presenter.describe(record).title
-            by = carried.by(both)
-            differences.append(QuestionDifference(title, both, effects, possible, by))
+            carries = _carries(both, len(shared[0]), means, n_answered)
+            differences.append(QuestionDifference(title, both, effects, possible, carries))
     differences.sort(key=lambda difference: -abs(difference.carries))
     return Compared(len(shared[0]), (fmean(scores[0]), fmean(scores[1])), differences)
 
@@ -298,25 +295,24 @@ def _differ(first: object, second: object) -> bool | None:
     return None if first is None or second is None else first != second
 
 
-@dataclass(frozen=True)
-class _Carried:
-    """What questions carry of the difference of two means.
+def _carries(
+    answers: tuple[Answer, Answer],
+    n_shared: int,
+    means: tuple[float, float],
+    n_answered: tuple[int, int],
+) -> float:
+    """Return what a question carries of the difference of two means.
 
-    Attributes:
+    Args:
+        answers: what the runs have of it.
         n_shared: number of questions with a result in both.
-        shared: mean scores over those.
+        means: mean scores over those.
         n_answered: number of results of each run.
     """
-
-    n_shared: int
-    shared: tuple[float, float]
-    n_answered: tuple[int, int]
-
-    def by(self, answers: tuple[Answer, Answer]) -> float:
-        first, second = (answer.score for answer in answers)
-        if first is not None and second is not None:
-            return (second - first) / self.n_shared
-        if second is not None:
-            return (second - self.shared[1]) / self.n_answered[1]
-        assert first is not None
-        return (self.shared[0] - first) / self.n_answered[0]
+    first, second = (answer.score for answer in answers)
+    if first is not None and second is not None:
+        return (second - first) / n_shared
+    if second is not None:
+        return (second - means[1]) / n_answered[1]
+    assert first is not None
+    return (means[0] - first) / n_answered[0]

@@ -20,9 +20,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
-from infthor_eval.errors import wrap_errors
 from infthor_eval.report.charts import COLOURS, Chart, Panels, Series
-from infthor_eval.storage.files import write_atomically
+from infthor_eval.storage.files import write_output
 from infthor_eval.terminal import printable
 
 # Runs beyond the number of colours take them again with another style of line; dashes are the
@@ -238,10 +237,7 @@ def _in_style() -> Iterator[None]:
 
 def _save(figure: Figure, path: Path, kind: str) -> Path:
     metadata = _SVG_METADATA if kind == "svg" else {}
-    with (
-        wrap_errors(f"{path}: cannot be written", "give another --out"),
-        write_atomically(path) as partial,
-    ):
+    with write_output(path, "give another --out") as partial:
         figure.savefig(partial, format=kind, dpi=160, metadata=metadata)
     return path
 

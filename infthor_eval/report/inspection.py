@@ -3,6 +3,7 @@
 import base64
 import os
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from urllib.parse import quote
 
@@ -11,6 +12,7 @@ from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.nieh.validation import DECISIONS, JudgedQuestion
 from infthor_eval.pages.one_file import read_part, write_page_file
 
+_read = partial(read_part, __package__)
 _IMAGES = "'self' file: data:"  # frames beside the page, from a disk or from a server
 
 
@@ -32,10 +34,6 @@ def write_inspection_page(path: Path, items: Sequence[JudgedQuestion], data: Nie
         script=[_read("inspection.js")],
         images=_IMAGES,
     )
-
-
-def _read(name: str) -> str:
-    return read_part(__package__, name)
 
 
 def _describe(judged: JudgedQuestion, data: NiehSet, folder: Path) -> dict[str, object]:

@@ -25,6 +25,9 @@ from infthor_eval.run import Run
 from infthor_eval.runs import UnitRecord
 
 _LONGEST = 2000  # characters of a field on the page
+# Of twins, in any suite.
+_NET_PAIRS = "net pairs"
+_PAIRS_FINDING = "has {} net pairs"
 
 
 class PlainPresenter:
@@ -63,11 +66,15 @@ class PlainPresenter:
     def measure_of(self, task: str, summary: Any) -> str:
         """Return what the primary metric of a task measures, by the suite's summary of a run;
         `measure`, unless tasks of the suite measure different things."""
-        return self.measure
+        return _NET_PAIRS if self.has_pairs(task, summary) else self.measure
 
     def finding_of(self, task: str, summary: Any) -> str:
         """Return `finding`, as `measure_of` returns `measure`."""
-        return self.finding
+        return _PAIRS_FINDING if self.has_pairs(task, summary) else self.finding
+
+    def has_pairs(self, task: str, summary: Any) -> bool:
+        """Return whether the primary metric of a task is net pairs of twins."""
+        return False
 
     def chance(self, task: str, summary: Any, records: Sequence[UnitRecord[Any]]) -> float | None:
         """Return what `blind`, which sees no frame, scores in the primary metric of a task, on its

@@ -22,9 +22,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure as MatplotlibFigure
 
 Record = UnitRecord[Any]
-# Of twins, in any suite.
-NET_PAIRS = "net pairs"
-PAIRS_FINDING = "has {} net pairs"
 FindFrames = Callable[[Record], Sequence[FrameRef]]
 
 
@@ -133,18 +130,6 @@ class EpisodeSelection:
     most: int | None = None
 
 
-class ReplayFrame(Protocol):
-    """A state of a replayed episode: its start, or the result of a step."""
-
-    @property
-    def observation(self) -> Any:
-        """The world at that state, with `frame` (uint8 RGB array); None if nobody acted in it."""
-
-    @property
-    def note(self) -> str:
-        """How the replay differs from the recorded episode; empty if it does not."""
-
-
 class OpenReplay(Protocol):
     """A simulator in which recorded episodes of one trajectory are replayed."""
 
@@ -153,7 +138,11 @@ class OpenReplay(Protocol):
         """Number of episodes of the trajectory."""
 
     def frames(self, records: Sequence[Record], /) -> Iterator[Any]:
-        """Replay episodes and yield `ReplayFrame`s: the start of each, then one per step.
+        """Replay episodes and yield their states: the start of each, then one per step.
+
+        Each has `observation`, the world at that state, with `frame` (uint8 RGB array), which is
+        None if nobody acted in it; and `note`, how the replay differs from the recorded episode,
+        which is empty if it does not.
 
         Raises:
             InfthorError: an episode cannot be replayed.
@@ -180,32 +169,26 @@ class Recording:
     open: Callable[[Path | None, Path | None], AbstractContextManager[OpenReplay]]
 
 
-class Replay(Protocol):
-    """Replays recorded episodes and draws them.
+@dataclass(frozen=True)
+class Replay:
+    """How recorded episodes are replayed and drawn.
 
     Attributes:
         unit: what an episode is called, in the plural.
         options: options of `watch` that this suite supports besides those of all suites.
-        sheet_rows: maximum number of episodes on a sheet; 0 if there are no sheets.
+        select: finds the selected episodes in a run. It raises UsageError if the run has no such
+            episodes, or the selection is ambiguous; DataError if the run has no episodes, or its
+            header is not one of this suite.
+        draw_map: draws an observation from above, as a square of so many pixels.
+        pictures: draws frames as pictures of a film, all of one size, with a heading.
+        draw_sheet: draws frames as one picture with a row per episode; None if there are no sheets.
+        sheet_rows: maximum number of episodes on a sheet.
     """
 
     unit: str
     options: Collection[str]
-    sheet_rows: int
-
-    def select(self, run: Run, selection: EpisodeSelection) -> Recording:
-        """Find the selected episodes in a run.
-
-        Raises:
-            UsageError: the run has no such episodes, or the selection is ambiguous.
-            DataError: the run has no episodes, or its header is not one of this suite.
-        """
-
-    def draw_map(self, observation: Any, size: int) -> Image.Image:
-        """Draw an observation from above, as a square of `size` pixels."""
-
-    def pictures(self, frames: Iterable[Any], heading: str) -> Iterator[Image.Image]:
-        """Draw the frames as pictures of a film, all of one size, with a heading."""
-
-    def draw_sheet(self, frames: Iterable[Any], heading: str) -> Image.Image:
-        """Draw the frames as one picture with a row per episode."""
+    select: Callable[[Run, EpisodeSelection], Recording]
+    draw_map: Callable[[Any, int], Image.Image]
+    pictures: Callable[[Iterable[Any], str], Iterator[Image.Image]]
+    draw_sheet: Callable[[Iterable[Any], str], Image.Image] | None = None
+    sheet_rows: int = 0

@@ -1,7 +1,7 @@
 """Columns of the table of samples: those of all suites, and what a suite's own are made of.
 
 To add a column of samples (`show --per-sample`, `load_run`): here; a suite's in
-`suites/nieh_columns.py` or `suites/episode_columns.py`; and `docs/formats.md`.
+`suites/nieh_columns.py` or `suites/episodes.py`; and `docs/formats.md`.
 """
 
 from collections.abc import Callable

@@ -6,9 +6,9 @@ from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from infthor_eval.errors import UsageError, wrap_errors
+from infthor_eval.errors import UsageError
 from infthor_eval.report.exporting import FlatColumn, flat_columns
-from infthor_eval.storage.files import prepare_file, write_atomically
+from infthor_eval.storage.files import prepare_file, write_output
 from infthor_eval.tables import Table
 
 if TYPE_CHECKING:
@@ -32,11 +32,7 @@ def write_spreadsheet(path: Path, tables: Sequence[Table]) -> None:
     """
     from xlsxwriter import Workbook
 
-    with (
-        wrap_errors(f"{path}: cannot be written", "give another --xlsx"),
-        write_atomically(path) as partial,
-        Workbook(partial) as book,
-    ):
+    with write_output(path, "give another --xlsx") as partial, Workbook(partial) as book:
         bold = book.add_format({"bold": True})
         for table in tables:
             sheet = book.add_worksheet()

@@ -6,9 +6,9 @@ importing lm-eval.
 """
 
 import difflib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from importlib.metadata import EntryPoint, entry_points
 from importlib.util import find_spec
 from pathlib import Path
@@ -147,9 +147,8 @@ class Catalog:
     @cached_property
     def _entries(self) -> dict[str, tuple[Path, dict[str, Any]]]:
         entries: dict[str, tuple[Path, dict[str, Any]]] = {}
-        reader = _Reader(self._shared)
         for path in self._files():
-            settings = reader.settings(path)
+            settings = self._settings(path)
             with wrap_errors(
                 f"{path}: holds what JSON cannot", _HINT, catch=(TypeError, ValueError)
             ):
@@ -171,6 +170,31 @@ class Catalog:
                 raise DataError(f"{path}: 'task' of a group must be a list of task names")
             entries[name] = path, settings
         return entries
+
+    def _settings(self, path: Path, including: tuple[Path, ...] = ()) -> dict[str, Any]:
+        """Return a file's settings over its includes'; `including`: the files that include it."""
+        config = dict(self._read(path))
+        included = config.pop("include", None)
+        if included is None:
+            return config
+        if not isinstance(included, str):
+            raise DataError(f"{path}: include is {included!r:.60}, not the name of a file; {_HINT}")
+        beside = path.parent / included
+        # ValueError: a null character in the name
+        with wrap_errors(
+            f"{path}: include is {included!r:.60}, no name of a file",
+            _HINT,
+            catch=(OSError, ValueError),
+        ):
+            other = (beside if beside.exists() else self._shared.get(included, beside)).resolve()
+        if other in (*including, path.resolve()):
+            raise DataError(f"{path}: includes {included}, which includes it; {_HINT}")
+        return {**self._settings(other, (*including, path.resolve())), **config}
+
+    @cached_property
+    def _read(self) -> Callable[[Path], dict[str, Any]]:
+        """What reads a file, each once."""
+        return cache(_read)
 
     def _files(self) -> Iterator[Path]:
         for folder in (self.folder, *self.more):
@@ -217,37 +241,6 @@ def _task(name: str, path: Path, settings: Mapping[str, Any]) -> TaskFile:
         {**settings, "metadata": others},
         str(metadata.get("description", "")),
     )
-
-
-class _Reader:
-    """Reads task files with those that they include, each file once."""
-
-    def __init__(self, shared: Mapping[str, Path]) -> None:
-        """Take the files that tasks of any folder may include, by name."""
-        self._shared = shared
-        self._contents: dict[Path, Mapping[str, Any]] = {}
-
-    def settings(self, path: Path, including: tuple[Path, ...] = ()) -> dict[str, Any]:
-        """Return a file's settings over its includes'; `including`: the files that include it."""
-        if path not in self._contents:
-            self._contents[path] = _read(path)
-        config = dict(self._contents[path])
-        included = config.pop("include", None)
-        if included is None:
-            return config
-        if not isinstance(included, str):
-            raise DataError(f"{path}: include is {included!r:.60}, not the name of a file; {_HINT}")
-        beside = path.parent / included
-        # ValueError: a null character in the name
-        with wrap_errors(
-            f"{path}: include is {included!r:.60}, no name of a file",
-            _HINT,
-            catch=(OSError, ValueError),
-        ):
-            other = (beside if beside.exists() else self._shared.get(included, beside)).resolve()
-        if other in (*including, path.resolve()):
-            raise DataError(f"{path}: includes {included}, which includes it; {_HINT}")
-        return {**self.settings(other, (*including, path.resolve())), **config}
 
 
 def _read(path: Path) -> dict[str, Any]:

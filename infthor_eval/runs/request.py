@@ -60,11 +60,8 @@ class RunRequest:
 
 def run_folder(output: Path, header: RunHeader, tasks: Iterable[str]) -> Path:
     """Return the folder of a run of these tasks, `<output>/<name>/<tasks>-<config hash>`."""
-    return output / file_name(header.name) / f"{_names_of(tasks)}-{header.config.hash}"
-
-
-def _names_of(tasks: Iterable[str]) -> str:
-    return plain_name("+".join(tasks))[:_LONGEST_TASKS]
+    names = plain_name("+".join(tasks))[:_LONGEST_TASKS]
+    return output / file_name(header.name) / f"{names}-{header.config.hash}"
 
 
 @dataclass(frozen=True)

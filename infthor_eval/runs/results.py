@@ -1,22 +1,39 @@
 """The files that a run writes beside its journal: results, scores and usage."""
 
 import math
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic
 
 import msgspec
 
-from infthor_eval.errors import wrap_errors
-from infthor_eval.runs.journals.records import UnitRecord
+from infthor_eval.runs.journals.journal import Journal
+from infthor_eval.runs.journals.records import Payload, SuiteUnit, UnitRecord
 from infthor_eval.runs.suite import RunSummary, Suite
 from infthor_eval.runs.usage import Usage
-from infthor_eval.storage.files import write_atomically, writing_hint
+from infthor_eval.storage.files import write_output, writing_hint
 
 RESULTS = "results.json"
 _SCORES = "scores.jsonl"
 _USAGE = "usage.json"
+
+
+@dataclass(frozen=True)
+class Stored(Generic[Payload]):
+    """A run whose results are in its folder.
+
+    Attributes:
+        records: records of all units that were attempted.
+        n_missing: number of units that were not attempted.
+        usage: usage of all requests, those for cached artifacts included.
+    """
+
+    folder: Path
+    summary: RunSummary
+    records: Sequence[UnitRecord[Payload]]
+    n_missing: int
+    usage: Usage
 
 
 def results_document(
@@ -45,27 +62,28 @@ def _reproducible(summary: Any) -> dict[str, Any]:
     return {name: value for name, value in document.items() if name != "took"}
 
 
-def write_run_files(
+def store_results(
     folder: Path,
-    run: RunSummary,
-    suite: Suite[Any, Any],
-    records: Sequence[UnitRecord[Any]],
+    suite: Suite[SuiteUnit, Payload],
+    journal: Journal[Payload],
+    records: Sequence[UnitRecord[Payload]],
     n_missing: int,
-    usage: Usage,
-) -> None:
-    """Write results, scores and usage of a run; see the functions below for each."""
-    write_results(folder, results_document(run, suite, n_missing, usage))
-    write_scores(folder, suite, records)
+) -> Stored[Payload]:
+    """Sum up records of a journal, and write results, scores and usage of the run.
+
+    `results.json` is `results_document`; equal runs give equal bytes of it.
+    """
+    summary = RunSummary.of(suite, journal.header, records)
+    usage = Usage.total(
+        [record.usage for record in records] + [artifact.usage for artifact in journal.artifacts]
+    )
+    write_document(folder / RESULTS, results_document(summary, suite, n_missing, usage))
+    _write_scores(folder, suite, records)
     write_usage(folder, records, usage)
+    return Stored(folder, summary, records, n_missing, usage)
 
 
-def write_results(folder: Path, document: dict[str, Any]) -> None:
-    """Write `results.json` (`results_document`) into a run's folder; equal runs give equal
-    bytes."""
-    write_document(folder / RESULTS, document)
-
-
-def write_scores(folder: Path, suite: Suite[Any, Any], records: Sequence[UnitRecord[Any]]) -> None:
+def _write_scores(folder: Path, suite: Suite[Any, Any], records: Sequence[UnitRecord[Any]]) -> None:
     """Write every unit's scores to `scores.jsonl`, an object a line; equal runs give equal
     bytes."""
     rows = (
@@ -82,8 +100,7 @@ def write_scores(folder: Path, suite: Suite[Any, Any], records: Sequence[UnitRec
         }
         for record in records
     )
-    with _atomic_file(folder / _SCORES) as partial:
-        partial.write_bytes(b"".join(msgspec.json.encode(row) + b"\n" for row in rows))
+    _write(folder / _SCORES, b"".join(msgspec.json.encode(row) + b"\n" for row in rows))
 
 
 def write_usage(folder: Path, records: Sequence[UnitRecord[Any]], usage: Usage) -> None:
@@ -102,15 +119,10 @@ def write_usage(folder: Path, records: Sequence[UnitRecord[Any]], usage: Usage) 
 
 def write_document(path: Path, document: Any) -> None:
     """Write a JSON file into a run's folder, its keys sorted; equal documents give equal bytes."""
-    with _atomic_file(path) as partial:
-        encoded = msgspec.json.encode(document, order="sorted")
-        partial.write_bytes(msgspec.json.format(encoded, indent=2) + b"\n")
+    encoded = msgspec.json.encode(document, order="sorted")
+    _write(path, msgspec.json.format(encoded, indent=2) + b"\n")
 
 
-@contextmanager
-def _atomic_file(path: Path) -> Iterator[Path]:
-    with (
-        wrap_errors(f"{path}: cannot be written", writing_hint("; the journal holds it all")),
-        write_atomically(path) as partial,
-    ):
-        yield partial
+def _write(path: Path, content: bytes) -> None:
+    with write_output(path, writing_hint("; the journal holds it all")) as partial:
+        partial.write_bytes(content)

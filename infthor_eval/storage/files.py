@@ -8,7 +8,7 @@ import shutil
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
@@ -149,6 +149,13 @@ def write_atomically(path: Path, known_as: str | None = None) -> Iterator[Path]:
             remove(partial)
 
 
+@contextmanager
+def write_output(path: Path, hint: str | Callable[[BaseException], str]) -> Iterator[Path]:
+    """Write as `write_atomically` does; what prevents it is an error of one line with this hint."""
+    with wrap_errors(f"{path}: cannot be written", hint), write_atomically(path) as partial:
+        yield partial
+
+
 def is_written(path: Path) -> bool:
     """Return whether a path that `write_atomically` writes is there, and need not be written.
 
@@ -203,16 +210,11 @@ def _hold_lock(path: Path, what: Path, wait_s: float = 0.0) -> Iterator[None]:
 
 def _try_lock(path: Path) -> BinaryIO | None:
     """Return the locked file, or None if another process holds or has just removed it."""
-    file = path.open("ab")
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        if os.path.samestat(path.stat(), os.fstat(file.fileno())):
-            return file
-    except (BlockingIOError, FileNotFoundError):
-        file.close()
-        return None
-    except OSError:
-        file.close()
-        raise
-    file.close()
+    with ExitStack() as opened:
+        file = opened.enter_context(path.open("ab"))
+        with suppress(BlockingIOError, FileNotFoundError):
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            if os.path.samestat(path.stat(), os.fstat(file.fileno())):
+                opened.pop_all()  # whoever holds the lock closes it
+                return file
     return None

@@ -4,6 +4,7 @@ To add a command that shares its work: an `OpenWorker`, given to `run_jobs`.
 """
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing
 from typing import Any
 
 from infthor_eval.errors import InfthorError
@@ -32,10 +33,8 @@ def run_jobs(
     if worker_settings.is_local:
         yield from _run_here(open_worker, jobs)
         return
-    pool = Pool(
-        worker_settings.connect(open_worker), min(worker_settings.workers, max(1, len(jobs)))
-    )
-    try:
+    n_workers = min(worker_settings.workers, max(1, len(jobs)))
+    with closing(Pool(worker_settings.connect(open_worker), n_workers)) as pool:
         pool.open()
         for event in pool.run(len(jobs), lambda number: jobs[number]):
             if isinstance(event, JobResult):
@@ -49,15 +48,10 @@ def run_jobs(
                 notify(f"{event.reason}; its work goes to another")
             elif isinstance(event, WorkerWithdrawn):
                 notify(f"worker {event.worker} cannot be started, the others go on: {event.reason}")
-    finally:
-        pool.close()
 
 
 def _run_here(open_worker: OpenWorker, jobs: Sequence[Any]) -> Iterator[tuple[int, Any]]:
-    worker = open_worker(1)
-    try:
+    with closing(open_worker(1)) as worker:
         for number, job in enumerate(jobs):
             for result in worker.do(job):
                 yield number, result
-    finally:
-        worker.close()

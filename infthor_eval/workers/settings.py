@@ -55,19 +55,14 @@ class WorkerSettings:
     def connect(self, open_worker: OpenWorker) -> Connect:
         """Return links to the workers."""
         if self.ray_address is None:
-            return _processes(open_worker, self.workers)
+            return lambda number: _ProcessLink(open_worker, number, self.workers)
         from infthor_eval.workers.ray_cluster import ray_actors  # an extra, and slow to import
 
         return ray_actors(open_worker, self.ray_address, self.gpus_per_worker)
 
 
-def _processes(open_worker: OpenWorker, count: int) -> Connect:
-    """Return links to processes of this machine, each with its share of processors and GPUs."""
-    return lambda number: _ProcessLink(open_worker, number, count)
-
-
 class _ProcessLink:
-    """A worker in its own process; see `Link`."""
+    """A worker in a process of this machine, with its share of processors and GPUs; see `Link`."""
 
     def __init__(self, open_worker: OpenWorker, number: int, count: int) -> None:
         self._open_worker = open_worker

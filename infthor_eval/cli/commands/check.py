@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from contextlib import nullcontext
+from contextlib import closing, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -119,14 +119,8 @@ def check_parity(
     options = parse_model_args(model_args)
     theirs = reference_policy(reference_url, options.get("unnorm_key"))
     synthetic = nullcontext(frames_in_folder(frames)) if frames else synthetic_frames()
-    with synthetic as images, prints_as_notes():
-        ours = load_policy(model, options)
-        try:
-            comparison = compare_policies(
-                ours, theirs, images, instruction or INSTRUCTIONS, tolerance
-            )
-        finally:
-            ours.close()
+    with synthetic as images, prints_as_notes(), closing(load_policy(model, options)) as ours:
+        comparison = compare_policies(ours, theirs, images, instruction or INSTRUCTIONS, tolerance)
     print_table(comparison.table(), table_console())
     return int(not comparison.equal)
 

@@ -147,10 +147,7 @@ def _import_replies(
         problems = {"not imported": run.refused, "scored otherwise than logged": run.rescored}
         for what, rows in problems.items():
             print_refused(name, what, [(row.log, row.line, row.reason) for row in rows])
-        held = Run.held(
-            stored.folder, suite, stored.summary, usage=stored.usage, n_missing=run.n_missing
-        )
-        yield held, len(run.refused)
+        yield Run.just_stored(stored, suite), len(run.refused)
 
 
 def _import_plans(
@@ -174,5 +171,4 @@ def _import_plans(
             f"set-up of {run.n_failed_set_ups} more failed"
         )
         print_refused(name, "not imported", [(path, row.line, row.reason) for row in run.refused])
-        held = Run.held(stored.folder, suite, stored.summary, usage=stored.usage, n_missing=0)
-        yield held, len(run.refused)
+        yield Run.just_stored(stored, suite), len(run.refused)

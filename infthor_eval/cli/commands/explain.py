@@ -12,8 +12,7 @@ from infthor_eval.cli.options.values import PATH
 @click.argument("first", metavar="A", type=PATH)
 @click.argument("second", metavar="B", type=PATH)
 @click.option("--all", "every", is_flag=True, help="Show every question that differs, not a few.")
-@click.pass_context
-def command(context: click.Context, first: Path, second: Path, every: bool) -> None:
+def command(first: Path, second: Path, every: bool) -> int:
     """Print why the runs in the folders A and B differ, on the same questions.
 
     Exit code 0 if their replies and scores are equal, 3 if they differ by near ties alone, which
@@ -40,4 +39,4 @@ def command(context: click.Context, first: Path, second: Path, every: bool) -> N
         print_table(explanation.settings_table(), console)
     if not explanation.are_equal:
         print_table(explanation.questions_table(every=every), console)
-    context.exit(0 if explanation.are_equal else 3 if explanation.are_near_ties else 1)
+    return 0 if explanation.are_equal else 3 if explanation.are_near_ties else 1

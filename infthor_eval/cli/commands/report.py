@@ -10,15 +10,16 @@ import click
 
 from infthor_eval.cli.help import example_command
 from infthor_eval.cli.options.values import PATH, SET, WholeNumber
+from infthor_eval.cli.progress.bar import PacedBar
 from infthor_eval.cli.progress.notes import print_failure, print_note
 from infthor_eval.errors import UsageError
+from infthor_eval.report.web.progress import PageProgress
 from infthor_eval.storage.files import prepare_file, prepare_folder, require_writable
 from infthor_eval.terminal import error_console, print_line, progress_bar
 
 if TYPE_CHECKING:
     from rich.progress import Progress
 
-    from infthor_eval.cli.progress.bar import PacedBar
     from infthor_eval.report.presenter import FigureRequest
     from infthor_eval.report.web.build import PageRequest
 
@@ -193,7 +194,7 @@ def _runs_among(paths: Sequence[Path]) -> list[Path]:
     return runs
 
 
-class _PageBars:
+class _PageBars(PageProgress):
     """See `PageProgress`: a bar per piece of work on a terminal, lines elsewhere."""
 
     def __init__(self, progress: Progress) -> None:
@@ -201,8 +202,6 @@ class _PageBars:
         self._bars: dict[str, PacedBar] = {}
 
     def begin(self, what: str, n: int) -> None:
-        from infthor_eval.cli.progress.bar import PacedBar
-
         self._bars[what] = PacedBar(self._progress, what, n)
 
     def advance(self, what: str, detail: str = "") -> None:

@@ -165,16 +165,12 @@ def _print(rescoring: Rescoring, rescored: Rescored) -> None:
     from infthor_eval.run import Run
 
     report = rescored.report
-    run = rescored.run
     console = table_console()
     _print_counts(report)
     print_table(change_table(report, sources_of(rescoring.header.config)), console)
     if report.judge is not None and rescoring.judge is not None:
         print_table(agreement_table(report.judge, rescoring.judge.name), console)
-    held = Run.held(
-        run.folder, NiehSuite(), run.summary, usage=run.usage, n_missing=report.n_missing
-    )
-    print_results([held], ShowOptions())
+    print_results([Run.just_stored(rescored.run, NiehSuite())], ShowOptions())
 
 
 def _print_counts(report: RescoringReport) -> None:

@@ -131,18 +131,7 @@ def evaluate(
             if note := model_note(model):
                 print_note(f"{model}: {note}", "yellow")
         outcomes, is_stopped = execute_runs(runs, finish=export)
-    results = [
-        Run.held(
-            outcome.folder,
-            outcome.run.suite,
-            outcome.summary,
-            outcome.records,
-            outcome.usage,
-            outcome.n_missing,
-        )
-        for outcome in outcomes
-    ]
-    print_results(results, show)
+    print_results([Run.just_stored(outcome, outcome.run.suite) for outcome in outcomes], show)
     with quiet_notes(show.quiet):
         for outcome in outcomes:
             _print_faults(outcome)

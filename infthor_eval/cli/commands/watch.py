@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,12 +10,10 @@ import click
 
 from infthor_eval.cli.help import example_command
 from infthor_eval.cli.options.values import PATH, FiniteFloat, default_option
-from infthor_eval.errors import UsageError, wrap_errors
-from infthor_eval.storage.files import file_name, prepare_file, write_atomically
+from infthor_eval.errors import UsageError
+from infthor_eval.storage.files import file_name, prepare_file, write_output
 
 if TYPE_CHECKING:
-    from PIL import Image
-
     from infthor_eval.report.presenter import Recording, Replay
     from infthor_eval.run import Run
     from infthor_eval.terminal import PlainConsole
@@ -92,7 +90,8 @@ def command(
     recording = replay.select(recorded, EpisodeSelection(task, trajectory, plans, episode, most))
     choice = [text.strip() for text in (plans, episode) if text is not None]
     parts = [recorded.label, *recording.tasks, recording.trajectory, *choice]
-    path = prepare_file(sheet or out or _default_file(parts))
+    # A file of its own for each choice.
+    path = prepare_file(sheet or out or _FOLDER / f"{file_name('-'.join(parts))}.mp4")
     rate = None if sheet is not None else fps
     _write(recorded, recording, path, data=data, scenes=scenes, fps=rate)
 
@@ -120,11 +119,6 @@ def _refuse_options(run: Run, replay: Replay, options: Mapping[str, object]) -> 
             )
 
 
-def _default_file(parts: Sequence[str]) -> Path:
-    """Return a file of its own for each choice."""
-    return _FOLDER / f"{file_name('-'.join(parts))}.mp4"
-
-
 def _write(
     run: Run,
     recording: Recording,
@@ -149,7 +143,10 @@ def _write(
         bar = PacedBar(progress, recording.trajectory, n_frames)
         frames = _watch_frames(session.frames(recording.records), bar.advance, notes)
         if fps is None:
-            _write_sheet(path, replay.draw_sheet(frames, heading))
+            assert replay.draw_sheet is not None  # or --sheet is refused
+            sheet = replay.draw_sheet(frames, heading)
+            with write_output(path, "give another --sheet") as partial:
+                sheet.save(partial, format="png")
             length = ""
         else:
             length = f", {write_animation(path, replay.pictures(frames, heading), fps) / fps:.0f} s"
@@ -165,11 +162,3 @@ def _watch_frames(
             notes.print(f"otherwise than recorded: {frame.note}")
         advance()
         yield frame
-
-
-def _write_sheet(path: Path, sheet: Image.Image) -> None:
-    with (
-        wrap_errors(f"{path}: cannot be written", "give another --sheet"),
-        write_atomically(path) as partial,
-    ):
-        sheet.save(partial, format="png")

@@ -27,6 +27,7 @@ from infthor_eval.cli.options.values import (
     include_option,
     output_option,
     split_names,
+    together,
 )
 from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
 from infthor_eval.errors import UsageError
@@ -133,8 +134,7 @@ _AS_GIVEN = ("data", "output", "limit", "seed", "name", "fresh", "recover", "inc
 
 def run_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add all options of a run to a command, for `RunOptions.from_click`."""
-    for option in reversed((config_option, *_OPTIONS, worker_options, _add_suite_options)):
-        command = option(command)
+    command = together(config_option, *_OPTIONS, worker_options, _add_suite_options)(command)
     _refuse_duplicate_options(command)
     return command
 

@@ -3,15 +3,16 @@
 Trackers are named as lm-eval names them.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import click
 
-from infthor_eval.cli.options.values import parse_pairs
+from infthor_eval.cli.options.values import parse_pairs, together
 from infthor_eval.errors import UsageError
 
+_FORMATS = ("csv", "latex", "markdown")
 _TRACKERS = {
     "wandb_args": "Send finished runs to Weights & Biases: arguments of wandb.init (project=NAME).",
     "trackio_args": "Send finished runs to trackio: arguments of trackio.init (project=NAME).",
@@ -43,58 +44,47 @@ class ShowOptions:
         return cls(params["full"], output_format, params.get("quiet", False))
 
 
-def show_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add --full, --format and --json to a command, for `ShowOptions.from_click`."""
-    formats = click.Choice(["csv", "latex", "markdown"])
-    return _with_options(command, formats, "Write the tables in this form.")
-
-
-def sample_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add --per-sample and the options of `show_options`, among them a format for samples alone."""
-    formats = click.Choice(["csv", "latex", "markdown", "parquet"])
-    command = _with_options(
-        command, formats, "Write the tables in this form; parquet has a row per sample."
-    )
-    return click.option(
-        "--per-sample",
-        is_flag=True,
-        help="Write a row per sample, not tables: --format csv or --format parquet.",
-    )(command)
-
-
-def _with_options(
-    command: Callable[..., Any], formats: click.Choice[str], help_text: str
-) -> Callable[..., Any]:
-    for option in (
-        click.option(
-            "--json", "as_json", is_flag=True, help="Print the results as JSON, as in results.json."
-        ),
-        click.option("--format", type=formats, help=help_text),
+def _options(formats: Sequence[str], help_text: str) -> Callable[..., Any]:
+    """Return --full, --format and --json, for `ShowOptions.from_click`."""
+    return together(
         click.option(
             "--full",
             is_flag=True,
             help="Show every scorer, column and table, and the published numbers.",
         ),
-    ):
-        command = option(command)
-    return command
+        click.option("--format", type=click.Choice(formats), help=help_text),
+        click.option(
+            "--json", "as_json", is_flag=True, help="Print the results as JSON, as in results.json."
+        ),
+    )
 
 
-def tracker_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add an option for each tracker to a command, which passes them to `parse_trackers`."""
-    for name, text in reversed(_TRACKERS.items()):
-        command = click.option(_option(name), metavar="K=V,...", help=text)(command)
-    return command
+def _name(tracker: str) -> str:
+    return f"--{tracker.replace('_', '-')}"
+
+
+show_options = _options(_FORMATS, "Write the tables in this form.")
+# The same with --per-sample, and a format for samples alone.
+sample_options = together(
+    click.option(
+        "--per-sample",
+        is_flag=True,
+        help="Write a row per sample, not tables: --format csv or --format parquet.",
+    ),
+    _options(
+        (*_FORMATS, "parquet"), "Write the tables in this form; parquet has a row per sample."
+    ),
+)
+# An option for each tracker; a command passes them to `parse_trackers`.
+tracker_options = together(
+    *(click.option(_name(one), metavar="K=V,...", help=text) for one, text in _TRACKERS.items())
+)
 
 
 def parse_trackers(params: Mapping[str, Any]) -> dict[str, dict[str, str]]:
     """Return the arguments of the trackers that are used, by option, of a command's parameters."""
     return {
-        name: parse_pairs(params[name].split(","), _option(name))
+        name: parse_pairs(params[name].split(","), _name(name))
         for name in _TRACKERS
         if params[name] is not None
     }
-
-
-def _option(name: str) -> str:
-    return f"--{name.replace('_', '-')}"

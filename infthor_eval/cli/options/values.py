@@ -65,6 +65,17 @@ def default_option(
     return click.option(name, type=kind, default=default, show_default=True, help=help)
 
 
+def together(*options: Callable[[Command], Command]) -> Callable[[Command], Command]:
+    """Return a decorator that adds several options to a command, in the order of its help."""
+
+    def add(command: Command) -> Command:
+        for option in reversed(options):
+            command = option(command)
+        return command
+
+    return add
+
+
 class ModelSpec(NamedTuple):
     """A model to evaluate.
 

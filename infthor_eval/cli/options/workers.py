@@ -1,38 +1,31 @@
 """The options of commands whose work several workers can share."""
 
-from collections.abc import Callable
-from typing import Any
-
 import click
 
-from infthor_eval.cli.options.values import default_option
+from infthor_eval.cli.options.values import default_option, together
 from infthor_eval.workers import WorkerSettings
 
 _MAX_WORKERS = 4096
 
-
-def worker_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add the options of workers to a command, which passes them to `parse_worker_settings`."""
-    for option in (
-        click.option(
-            "--gpus-per-worker",
-            type=click.FloatRange(0),
-            help="GPUs that Ray reserves for each worker; default: one where the cluster has any.",
-        ),
-        click.option(
-            "--ray-address",
-            metavar="ADDRESS",
-            help='Run the workers on this Ray cluster ("auto": on this machine).',
-        ),
-        default_option(
-            "--workers",
-            click.IntRange(1, _MAX_WORKERS),
-            default=1,
-            help="Processes that share the work; the results are the same.",
-        ),
-    ):
-        command = option(command)
-    return command
+# The options of workers; a command passes them to `parse_worker_settings`.
+worker_options = together(
+    default_option(
+        "--workers",
+        click.IntRange(1, _MAX_WORKERS),
+        default=1,
+        help="Processes that share the work; the results are the same.",
+    ),
+    click.option(
+        "--ray-address",
+        metavar="ADDRESS",
+        help='Run the workers on this Ray cluster ("auto": on this machine).',
+    ),
+    click.option(
+        "--gpus-per-worker",
+        type=click.FloatRange(0),
+        help="GPUs that Ray reserves for each worker; default: one where the cluster has any.",
+    ),
+)
 
 
 def parse_worker_settings(

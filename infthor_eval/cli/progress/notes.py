@@ -38,11 +38,9 @@ def quiet_notes(quiet: bool) -> Iterator[None]:
         NOTES.quiet = False
 
 
-@contextlib.contextmanager
-def prints_as_notes() -> Iterator[None]:
+def prints_as_notes() -> contextlib.AbstractContextManager[object]:
     """Send what code of others prints to standard error: other programs read our results."""
-    with contextlib.redirect_stdout(sys.stderr):
-        yield
+    return contextlib.redirect_stdout(sys.stderr)
 
 
 def print_left_out(root: Path, skipped: Iterable[SkippedQuestion]) -> None:

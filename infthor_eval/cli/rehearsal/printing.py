@@ -1,11 +1,8 @@
 """A rehearsal on the terminal."""
 
-from rich.console import Console
-
 from infthor_eval.cli.rehearsal.results import Attention, Images, Rehearsed
 from infthor_eval.report.terminal import print_table, table_console
 from infthor_eval.tables import Column, Row, Table
-from infthor_eval.terminal import printable
 
 _GB = 1e9
 _NONE = "-"
@@ -15,17 +12,12 @@ def print_rehearsed(found: Rehearsed) -> None:
     """Print what was found of a model, and the commands to type."""
     on = table_console()
     for line in _lines(found):
-        on.print(printable(line), markup=False, highlight=False, soft_wrap=True)
+        on.print(line)
     print_table(_contexts(found), on)
     print_table(_gpus(found), on)
-    for line in (*_closing(found), "", "on the machine with the GPU:"):
-        on.print(printable(line), markup=False, highlight=False, soft_wrap=True)
-    _print_commands(found, on)
-
-
-def _print_commands(found: Rehearsed, on: Console) -> None:
-    for command in found.commands:
-        on.print(printable(f"  {command}"), markup=False, highlight=False, soft_wrap=True)
+    commands = (f"  {command}" for command in found.commands)
+    for line in (*_closing(found), "", "on the machine with the GPU:", *commands):
+        on.print(line)
 
 
 def _lines(found: Rehearsed) -> list[str]:

@@ -36,8 +36,8 @@ from infthor_eval.runs import (
     UnitRecord,
     keep_request,
 )
-from infthor_eval.runs.results import write_document
-from infthor_eval.runs.stored.writing import Stored, store_run
+from infthor_eval.runs.results import Stored, write_document
+from infthor_eval.runs.stored.writing import store_run
 
 RESCORED = "rescored.json"  # in the run's folder: what has changed
 

@@ -156,27 +156,23 @@ def _distribution(facts: SetFacts) -> Iterator[dict[str, Any]]:
 
 
 def _file_object(file: FileFact, encoding: str, text: str) -> dict[str, Any]:
-    return {
-        "@type": "cr:FileObject",
-        "@id": file.path,
-        "name": file.path,
-        "description": text,
-        "contentUrl": file.path,
-        "contentSize": f"{file.size} B",
-        "encodingFormat": encoding,
-        "sha256": file.sha256,
-    }
+    return _node(
+        "FileObject",
+        file.path,
+        text,
+        contentUrl=file.path,
+        contentSize=f"{file.size} B",
+        encodingFormat=encoding,
+        sha256=file.sha256,
+    )
 
 
 def _file_set(name: str, encoding: str, includes: Sequence[str], text: str) -> dict[str, Any]:
-    return {
-        "@type": "cr:FileSet",
-        "@id": name,
-        "name": name,
-        "description": text,
-        "encodingFormat": encoding,
-        "includes": list(includes),
-    }
+    return _node("FileSet", name, text, encodingFormat=encoding, includes=list(includes))
+
+
+def _node(kind: str, name: str, text: str, **more: Any) -> dict[str, Any]:
+    return {"@type": f"cr:{kind}", "@id": name, "name": name, "description": text, **more}
 
 
 def _record_sets(facts: SetFacts) -> Iterator[dict[str, Any]]:
@@ -186,26 +182,14 @@ def _record_sets(facts: SetFacts) -> Iterator[dict[str, Any]]:
             _field(name, column, _COLUMNS.get(column, column), file, {"column": column})
             for column in _header(facts.data.directory / file.path)
         ]
-        yield {
-            "@type": "cr:RecordSet",
-            "@id": name,
-            "name": name,
-            "description": "questions with their answers",
-            "field": fields,
-        }
+        yield _node("RecordSet", name, "questions with their answers", field=fields)
     if facts.pairs_file is not None:
         fields = [
             _field("pairs", name, text, facts.pairs_file, {"column": name})
             for name, text in _PAIR_FIELDS.items()
         ]
-        yield {
-            "@type": "cr:RecordSet",
-            "@id": "pairs",
-            "name": "pairs",
-            "description": "pairs of worlds and what differs between them",
-            "key": {"@id": "pairs/id"},
-            "field": fields,
-        }
+        text = "pairs of worlds and what differs between them"
+        yield _node("RecordSet", "pairs", text, key={"@id": "pairs/id"}, field=fields)
 
 
 def _field(

@@ -14,7 +14,6 @@ from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.own_folder import OWN_FRAMES
 from infthor_eval.formats.reading import read_json
 from infthor_eval.formats.set_info import frames_of, writer_of
-from infthor_eval.formats.twins import TwinPair
 from infthor_eval.nieh.guessing.audit import Audit, audit
 from infthor_eval.nieh.guessing.chains import form_of
 from infthor_eval.nieh.guessing.clue_facts import read_scenes
@@ -173,12 +172,9 @@ def read_facts(root: Path) -> SetFacts:
 
 def _read_scenes(data: NiehSet) -> Mapping[str, int]:
     scenes = read_scenes(data)
-    of_twins = {} if scenes else {name: pair.floor_plan for name, pair in _twins(data).items()}
-    return Counter((scenes or of_twins).values())
-
-
-def _twins(data: NiehSet) -> Mapping[str, TwinPair]:
-    return data.twins if any(question.pair for question in data.questions) else {}
+    if not scenes and any(question.pair for question in data.questions):
+        scenes = {name: pair.floor_plan for name, pair in data.twins.items()}
+    return Counter(scenes.values())
 
 
 def _file_fact(path: Path, folder: Path) -> FileFact:

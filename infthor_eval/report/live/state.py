@@ -14,7 +14,7 @@ from infthor_eval.pages.server import file_route
 from infthor_eval.rates import Rate
 from infthor_eval.report.sample import Sample
 from infthor_eval.run import Run
-from infthor_eval.runs import NOTHING, RunSummary, UnitRecord, Usage
+from infthor_eval.runs import NOTHING, RunHeader, RunSummary, UnitRecord, Usage
 from infthor_eval.runs.journals.following import FollowedJournal, is_written
 from infthor_eval.runs.journals.shards import FOLDER
 from infthor_eval.runs.stored.search import Results, read_results, run_folders
@@ -164,9 +164,7 @@ class LiveRun:
             tasks=tuple(run.tasks),
             simulator=run.simulator,
             age=_age(self._run),
-            n_units=header.n_units
-            if header.n_units is not None
-            else _n_units(results, self._totals.n_done),
+            n_units=_n_units(header, results, self._totals.n_done),
             totals=self._totals,
             measure=self._measure or run.presenter.measure,
             target_label=run.presenter.target_label,
@@ -226,8 +224,10 @@ def _age(run: Path) -> float:
     return max(0.0, time.time() - max(path.stat().st_mtime for path in (run / FOLDER).iterdir()))
 
 
-def _n_units(results: Results | None, n_done: int) -> int | None:
-    return None if results is None else results.n_missing + n_done
+def _n_units(header: RunHeader, results: Results | None, n_done: int) -> int | None:
+    if header.n_units is not None or results is None:
+        return header.n_units
+    return results.n_missing + n_done
 
 
 def _sample(run: Run, record: UnitRecord[Any]) -> LiveSample:

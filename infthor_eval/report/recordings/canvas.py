@@ -24,8 +24,8 @@ FAINT = "#6b6b6b"
 _PAPER = "#ffffff"
 # Colours of maps: Okabe and Ito's, as in the figures, for what the instruction names.
 FURNITURE = "#d9cbb3"
-FURNITURE_EDGE = "#9c8a6a"
-NAMED = "#f8c89b"
+_FURNITURE_EDGE = "#9c8a6a"
+_NAMED = "#f8c89b"
 NAMED_EDGE = "#D55E00"
 OVERSAMPLING = 2  # Pillow draws hard edges; drawn larger and reduced they are smooth
 GOOD = "#1a7f37"
@@ -33,6 +33,12 @@ BAD = "#c1272d"
 WARN = "#9a5b00"
 _BAR = "#0072B2"
 _ROW = 29  # height of a row of numbers
+
+
+def shape_look(*, is_named: bool) -> dict[str, Any]:
+    """Return how Pillow draws a thing on a map: what the instruction names stands out."""
+    fill, edge, width = (_NAMED, NAMED_EDGE, 3) if is_named else (FURNITURE, _FURNITURE_EDGE, 1)
+    return {"fill": fill, "outline": edge, "width": width * OVERSAMPLING}
 
 
 class Line(NamedTuple):

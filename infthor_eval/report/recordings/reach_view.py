@@ -3,13 +3,7 @@
 from PIL import Image, ImageDraw
 
 from infthor_eval.manipulation.recorded.replay_frames import NearbyObject, Place, Reach
-from infthor_eval.report.recordings.canvas import (
-    FURNITURE,
-    FURNITURE_EDGE,
-    NAMED,
-    NAMED_EDGE,
-    OVERSAMPLING,
-)
+from infthor_eval.report.recordings.canvas import NAMED_EDGE, OVERSAMPLING, shape_look
 from infthor_eval.report.recordings.fonts import Font, font
 
 # pixels
@@ -64,10 +58,7 @@ class _Pane:
         pen = ImageDraw.Draw(large, "RGBA")
         # Large objects first, those that the instruction names last, on top.
         for nearby in sorted(self._items, key=lambda nearby: (nearby.is_named, -_size(nearby))):
-            fill, edge, width = (
-                (NAMED, NAMED_EDGE, 3) if nearby.is_named else (FURNITURE, FURNITURE_EDGE, 1)
-            )
-            pen.polygon(self._outline(nearby), fill=fill, outline=edge, width=width * OVERSAMPLING)
+            pen.polygon(self._outline(nearby), **shape_look(is_named=nearby.is_named))
         self._draw_arm(pen)
         picture = large.resize(self._size, Image.Resampling.BOX)
         words = ImageDraw.Draw(picture)
@@ -78,26 +69,17 @@ class _Pane:
 
     def _draw_arm(self, pen: ImageDraw.ImageDraw) -> None:
         reach = self._reach
-        x, y = self._fine(reach.hand)
+        hand = self._fine(reach.hand)
         radius = reach.radius * self._per_metre * OVERSAMPLING
-        pen.ellipse(
-            (x - radius, y - radius, x + radius, y + radius),
-            fill=_SPHERE,
-            outline=_HAND,
-            width=OVERSAMPLING,
-        )
+        pen.circle(hand, radius, fill=_SPHERE, outline=_HAND, width=OVERSAMPLING)
         if len(reach.path) > 1:
-            pen.line(
-                [self._fine(position) for position in reach.path],
-                fill=_PATH,
-                width=4 * OVERSAMPLING,
-                joint="curve",
-            )
+            path = [self._fine(position) for position in reach.path]
+            pen.line(path, fill=_PATH, width=4 * OVERSAMPLING, joint="curve")
         joints = [self._fine(joint) for joint in reach.joints]
-        pen.line([*joints, (x, y)], fill=_ARM, width=3 * OVERSAMPLING, joint="curve")
+        pen.line([*joints, hand], fill=_ARM, width=3 * OVERSAMPLING, joint="curve")
         for position in joints:
-            _draw_dot(pen, position, 4 * OVERSAMPLING, _ARM)
-        _draw_dot(pen, (x, y), 6 * OVERSAMPLING, _HAND)
+            pen.circle(position, 4 * OVERSAMPLING, fill=_ARM)
+        pen.circle(hand, 6 * OVERSAMPLING, fill=_HAND)
 
     def _write_names(self, pen: ImageDraw.ImageDraw) -> None:
         """Write names in their objects; beside them if small and named by the instruction."""
@@ -161,13 +143,6 @@ def _is_in_view(nearby: NearbyObject, reach: Reach, *, is_above: bool) -> bool:
         return nearby.low <= reach.high[2] and reach.low[2] <= nearby.high
     across = [right for right, _ in nearby.corners]
     return min(across) <= reach.high[0] and reach.low[0] <= max(across)
-
-
-def _draw_dot(
-    pen: ImageDraw.ImageDraw, position: tuple[float, float], half: float, colour: str
-) -> None:
-    x, y = position
-    pen.ellipse((x - half, y - half, x + half, y + half), fill=colour)
 
 
 def _size(nearby: NearbyObject) -> float:

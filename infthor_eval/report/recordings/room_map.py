@@ -14,13 +14,7 @@ from infthor_eval.plans.recorded.replay_frames import (
     Point,
     RoomMap,
 )
-from infthor_eval.report.recordings.canvas import (
-    FURNITURE,
-    FURNITURE_EDGE,
-    NAMED,
-    NAMED_EDGE,
-    OVERSAMPLING,
-)
+from infthor_eval.report.recordings.canvas import FURNITURE, NAMED_EDGE, OVERSAMPLING, shape_look
 from infthor_eval.report.recordings.fonts import Font, font
 
 _CELL = 0.25  # metres
@@ -106,12 +100,8 @@ def _draw_room(pen: ImageDraw.ImageDraw, room: RoomMap, scale: _Scale) -> None:
         pen.rectangle(scale.box(*corners), fill=_FLOOR, outline=_GRID)
     # Large objects first, those that the plan names last, on top.
     for shape in sorted(room.objects, key=lambda shape: (shape.is_named, -_area(shape))):
-        fill, edge, width = (
-            (NAMED, NAMED_EDGE, 3) if shape.is_named else (FURNITURE, FURNITURE_EDGE, 1)
-        )
-        pen.rectangle(
-            scale.box(shape.low, shape.high), fill=fill, outline=edge, width=width * OVERSAMPLING
-        )
+        look = shape_look(is_named=shape.is_named)
+        pen.rectangle(scale.box(shape.low, shape.high), **look)
         if shape.is_named:
             _draw_ring(pen, shape, scale)
 
@@ -125,19 +115,16 @@ def _draw_ring(pen: ImageDraw.ImageDraw, shape: MapObject, scale: _Scale) -> Non
     half = _RING * OVERSAMPLING
     left, top, right, bottom = scale.box(shape.low, shape.high)
     if max(right - left, bottom - top) < 2 * half:
-        x, y = scale.fine(_middle(shape))
-        pen.ellipse(
-            (x - half, y - half, x + half, y + half), outline=NAMED_EDGE, width=2 * OVERSAMPLING
-        )
+        middle = scale.fine(_middle(shape))
+        pen.circle(middle, half, outline=NAMED_EDGE, width=2 * OVERSAMPLING)
 
 
 def _draw_path(pen: ImageDraw.ImageDraw, walked: Sequence[Point], scale: _Scale) -> None:
     points = [scale.fine(point) for point in walked]
     if len(points) > 1:
         pen.line(points, fill=_PATH, width=4 * OVERSAMPLING, joint="curve")
-    half = 4 * OVERSAMPLING
-    for x, y in points:
-        pen.ellipse((x - half, y - half, x + half, y + half), fill=_PATH)
+    for point in points:
+        pen.circle(point, 4 * OVERSAMPLING, fill=_PATH)
 
 
 def _draw_agent(pen: ImageDraw.ImageDraw, agent: FloorPose, scale: _Scale) -> None:

@@ -1,8 +1,7 @@
 """Presenter of manipulation: an arm's episodes step by step, its reward, its success by radius."""
 
-import math
 import re
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
@@ -18,20 +17,17 @@ from infthor_eval.manipulation.recorded.radii import Points, SuccessByRadius, su
 from infthor_eval.manipulation.recorded.runs import ArmRun, label_by_radius
 from infthor_eval.manipulation.records import ArmRecord, ArmStep
 from infthor_eval.manipulation.summary import ManipulationSummary
-from infthor_eval.pairs import PAIR_BOUNDS
 from infthor_eval.rates import format_percent
 from infthor_eval.report.charts import Chart, Class, Panels, Series, point_of
 from infthor_eval.report.descriptions import Description, StepRow
-from infthor_eval.report.plain import PlainPresenter
 from infthor_eval.report.presenter import (
-    NET_PAIRS,
-    PAIRS_FINDING,
     EpisodeSelection,
     Figure,
     FigureRequest,
     FigureResult,
     GroupScore,
     Recording,
+    Replay,
 )
 from infthor_eval.report.recordings.arm_pictures import (
     MOST_ROWS,
@@ -41,7 +37,7 @@ from infthor_eval.report.recordings.arm_pictures import (
 )
 from infthor_eval.report.recordings.reach_view import draw_reach
 from infthor_eval.report.runs import choose_evenly
-from infthor_eval.report.suites.episode_columns import ARM_COLUMNS
+from infthor_eval.report.suites.episodes import ARM_COLUMNS, EpisodesPresenter
 from infthor_eval.report.suites.reward_curves import (
     curves_on_page,
     curves_result,
@@ -62,37 +58,27 @@ Record = UnitRecord[ArmRecord]
 _FLOOR = "in the sphere at the start"
 
 
-class ArmEpisodesReplay:
-    """See `Replay`."""
+def _select_recorded(run: Run, selection: EpisodeSelection) -> Recording:
+    """Find the selected episodes in a run; see `Replay.select`."""
+    from infthor_eval.manipulation.recorded.replaying import recorded_episodes, replay_episodes
 
-    unit = "episodes"
-    options: Collection[str] = ("--episode", "--sheet")
-    sheet_rows = MOST_ROWS
+    recorded = recorded_episodes(_arm_run(run), selection.task, selection.trajectory)
+    return Recording(
+        trajectory=recorded.trajectory,
+        tasks=recorded.tasks,
+        records=_select_episodes(recorded, selection),
+        simulator=recorded.run.config.simulator,
+        open=partial(replay_episodes, recorded),
+    )
 
-    def select(self, run: Run, selection: EpisodeSelection) -> Recording:
-        """See `Replay.select`."""
-        from infthor_eval.manipulation.recorded.replaying import recorded_episodes, replay_episodes
 
-        recorded = recorded_episodes(_arm_run(run), selection.task, selection.trajectory)
-        return Recording(
-            trajectory=recorded.trajectory,
-            tasks=recorded.tasks,
-            records=_select_episodes(recorded, selection),
-            simulator=recorded.run.config.simulator,
-            open=lambda data, scenes: replay_episodes(recorded, data, scenes),
-        )
+def _draw_map(observation: "ArmObservation", size: int) -> Image.Image:
+    """Draw the arm's reach, from above and from the side."""
+    return draw_reach(observation.reach, size)
 
-    def draw_map(self, observation: "ArmObservation", size: int) -> Image.Image:
-        """See `Replay.draw_map`: the arm's reach, from above and from the side."""
-        return draw_reach(observation.reach, size)
 
-    def pictures(self, frames: Iterable["ArmFrame"], heading: str) -> Iterator[Image.Image]:
-        """See `Replay.pictures`."""
-        return arm_pictures(frames, heading)
-
-    def draw_sheet(self, frames: Iterable["ArmFrame"], heading: str) -> Image.Image:
-        """See `Replay.draw_sheet`."""
-        return draw_sheet(list(sheet_rows(frames)), heading)
+def _draw_sheet(frames: Iterable["ArmFrame"], heading: str) -> Image.Image:
+    return draw_sheet(list(sheet_rows(frames)), heading)
 
 
 def _select_episodes(recorded: "RecordedEpisodes", selection: EpisodeSelection) -> Sequence[Record]:
@@ -228,16 +214,22 @@ def _embedded(success: SuccessByRadius) -> tuple[str, ...]:
     return () if label is None else (label,)
 
 
-class ManipulationPresenter(PlainPresenter):
+class ManipulationPresenter(EpisodesPresenter):
     """See `PlainPresenter`."""
 
     title = "Pick-ups and puts"
     measure = "successful episodes"
     finding = "succeeds in {} of the episodes"
     target_label = "target"
-    reply_label = "ended"
-    main_metric = "success"
-    replay = ArmEpisodesReplay()
+    replay = Replay(
+        unit="episodes",
+        options=("--episode", "--sheet"),
+        select=_select_recorded,
+        draw_map=_draw_map,
+        pictures=arm_pictures,
+        draw_sheet=_draw_sheet,
+        sheet_rows=MOST_ROWS,
+    )
     columns = ARM_COLUMNS
     figures: Mapping[str, Figure] = {
         "6": Figure("reward of pick-ups and puts along trajectories", _build_figure_6),
@@ -246,21 +238,9 @@ class ManipulationPresenter(PlainPresenter):
         ),
     }
 
-    def is_share(self, metric: str, scores: Sequence[float]) -> bool:
-        """See `PlainPresenter.is_share`."""
-        return metric == self.main_metric or metric in PAIR_BOUNDS
-
-    def bounds(self, metric: str) -> tuple[float, float]:
-        """See `PlainPresenter.bounds`: a reward has none."""
-        return (-math.inf, math.inf) if metric == "reward" else PAIR_BOUNDS.get(metric, (0.0, 1.0))
-
-    def measure_of(self, task: str, summary: ManipulationSummary) -> str:
-        """See `PlainPresenter.measure_of`: of twins, pairs count."""
-        return self.measure if summary.tasks[task].choices is UNSET else NET_PAIRS
-
-    def finding_of(self, task: str, summary: ManipulationSummary) -> str:
-        """See `PlainPresenter.finding_of`."""
-        return self.finding if summary.tasks[task].choices is UNSET else PAIRS_FINDING
+    def has_pairs(self, task: str, summary: ManipulationSummary) -> bool:
+        """See `PlainPresenter.has_pairs`."""
+        return summary.tasks[task].choices is not UNSET
 
     def group_scores(self, records: Sequence[Record]) -> Iterator[GroupScore]:
         """See `PlainPresenter.group_scores`: net pairs of twins."""
@@ -290,14 +270,6 @@ class ManipulationPresenter(PlainPresenter):
             name for name in (payload.object_id, payload.receptacle_id) if name is not None
         )
         return Description(payload.instruction, target, payload.kind)
-
-    def reply(self, record: Record) -> str:
-        """See `PlainPresenter.reply`: how the episode ended."""
-        return record.payload.ended
-
-    def details(self, record: Record) -> Mapping[str, str]:
-        """See `PlainPresenter.details`: the page shows all of it elsewhere."""
-        return {}
 
     def steps(self, record: Record) -> list[StepRow]:
         """See `PlainPresenter.steps`."""

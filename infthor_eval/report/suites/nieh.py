@@ -19,8 +19,6 @@ from infthor_eval.report.charts import Chart
 from infthor_eval.report.descriptions import THOUGHT, Description
 from infthor_eval.report.plain import PlainPresenter
 from infthor_eval.report.presenter import (
-    NET_PAIRS,
-    PAIRS_FINDING,
     Figure,
     FindFrames,
     GroupScore,
@@ -62,13 +60,9 @@ class NiehPresenter(PlainPresenter):
         )
     }
 
-    def measure_of(self, task: str, summary: NiehSummary) -> str:
-        """See `PlainPresenter.measure_of`: of twins, pairs count."""
-        return self.measure if summary.tasks[task].pairs is None else NET_PAIRS
-
-    def finding_of(self, task: str, summary: NiehSummary) -> str:
-        """See `PlainPresenter.finding_of`."""
-        return self.finding if summary.tasks[task].pairs is None else PAIRS_FINDING
+    def has_pairs(self, task: str, summary: NiehSummary) -> bool:
+        """See `PlainPresenter.has_pairs`."""
+        return summary.tasks[task].pairs is not None
 
     def chance(self, task: str, summary: NiehSummary, records: Sequence[Record]) -> float | None:
         """See `PlainPresenter.chance`: of questions that of `blind`; who does not know which world

@@ -20,16 +20,9 @@ def _above_blind(scorer: str, record: UnitRecord[NiehAnswer]) -> float | None:
     return score_above_blind(record.payload, scorer)
 
 
-def _clues(name: str, record: UnitRecord[NiehAnswer]) -> int | None:
-    return getattr(record.payload.shown_clues, name, None)
-
-
-def _recall(name: str, record: UnitRecord[NiehAnswer]) -> float | None:
-    return getattr(record.payload.recall, name, None)
-
-
-def _twin(name: str, record: UnitRecord[NiehAnswer]) -> Any:
-    return getattr(record.payload.twin, name, None)
+def _in_part(part: str, name: str, record: UnitRecord[NiehAnswer]) -> Any:
+    """Return a field of a part of the payload, None where the payload has no such part."""
+    return getattr(getattr(record.payload, part), name, None)
 
 
 def _n_recalled(record: UnitRecord[NiehAnswer]) -> int | None:
@@ -46,19 +39,19 @@ NIEH_COLUMNS = (
     payload_column("file", str),
     payload_column("moment", int),
     payload_column("n_clues", int),
-    SampleColumn("n_clues_shown", int, partial(_clues, "n_shown")),
-    SampleColumn("n_frames_after_clues", int, partial(_clues, "n_after")),
+    SampleColumn("n_clues_shown", int, partial(_in_part, "shown_clues", "n_shown")),
+    SampleColumn("n_frames_after_clues", int, partial(_in_part, "shown_clues", "n_after")),
     *(SampleColumn(f"blind_{scorer}", float, partial(_blind_score, scorer)) for scorer in SCORERS),
     *(
         SampleColumn(f"above_blind_{scorer}", float, partial(_above_blind, scorer))
         for scorer in SCORERS
     ),
-    SampleColumn("pair", str, partial(_twin, "pair")),
-    SampleColumn("fact", str, partial(_twin, "fact")),
-    SampleColumn("age", int, partial(_twin, "age")),
-    SampleColumn("span", int, partial(_twin, "span")),
+    SampleColumn("pair", str, partial(_in_part, "twin", "pair")),
+    SampleColumn("fact", str, partial(_in_part, "twin", "fact")),
+    SampleColumn("age", int, partial(_in_part, "twin", "age")),
+    SampleColumn("span", int, partial(_in_part, "twin", "span")),
     SampleColumn("n_recalled", int, _n_recalled),
-    SampleColumn("build_seconds", float, partial(_recall, "build_s")),
-    SampleColumn("recall_seconds", float, partial(_recall, "recall_s")),
+    SampleColumn("build_seconds", float, partial(_in_part, "recall", "build_s")),
+    SampleColumn("recall_seconds", float, partial(_in_part, "recall", "recall_s")),
     *(SampleColumn(facet.name, str, facet.class_of) for facet in FACETS if not facet.has_column),
 )

@@ -7,6 +7,7 @@ read from the sets, as far as these are there and unchanged.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
 from itertools import chain
 from pathlib import Path
 
@@ -42,7 +43,7 @@ def find_timelines(runs: Sequence[Run], data: Path | None, thumbnails: Thumbnail
     size of all.
     """
     sets = RunSets(runs, data)
-    logs = _TrajectoryFacts()
+    read_facts = cache(_read_frame_facts)  # each log once
     chosen: dict[UnitKey, _FrameChoice] = {}
     for key, records in records_by_unit(runs).items():
         question = sets.find_question(key, next(record for record in records if record))
@@ -50,7 +51,7 @@ def find_timelines(runs: Sequence[Run], data: Path | None, thumbnails: Thumbnail
         if opened is None or question is None:
             continue
         try:
-            facts_of_frames = logs.read(opened.folder(question.traj_id))
+            facts_of_frames = read_facts(opened.folder(question.traj_id))
             choice = _choose_frames(opened, question, facts_of_frames)
             chosen[key] = replace(choice, recalled=_recalled(records) - choice.shown)
         # The question was skipped or failed for it, and its record has the reason.
@@ -94,18 +95,6 @@ class _FrameChoice:
     def shown(self) -> frozenset[int]:
         """Indices of the clues and the further frames."""
         return self.clues | self.others
-
-
-class _TrajectoryFacts:
-    """What the logs of trajectories say of their frames, each log read once."""
-
-    def __init__(self) -> None:
-        self._facts: dict[SetPath, Sequence[FrameFacts]] = {}  # by the trajectory's folder
-
-    def read(self, folder: SetPath) -> Sequence[FrameFacts]:
-        if folder not in self._facts:
-            self._facts[folder] = _read_frame_facts(folder)
-        return self._facts[folder]
 
 
 def _choose_frames(data: NiehSet, question: Question, facts: Sequence[FrameFacts]) -> _FrameChoice:

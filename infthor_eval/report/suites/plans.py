@@ -1,16 +1,13 @@
 """Presenter of plans: what an agent did step by step, and the reward it earned."""
 
-import math
 import re
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from msgspec import UNSET
-from PIL import Image
 
 from infthor_eval.errors import UsageError
-from infthor_eval.pairs import PAIR_BOUNDS
 from infthor_eval.plans.recorded.curves import plan_curves
 from infthor_eval.plans.recorded.runs import PlansRun
 from infthor_eval.plans.records import PlanRecord
@@ -18,20 +15,18 @@ from infthor_eval.plans.summary import PlansSummary
 from infthor_eval.plans.twins.results import score_pairs
 from infthor_eval.report.charts import Chart
 from infthor_eval.report.descriptions import Description, StepRow
-from infthor_eval.report.plain import PlainPresenter
 from infthor_eval.report.presenter import (
-    NET_PAIRS,
-    PAIRS_FINDING,
     EpisodeSelection,
     Figure,
     FigureRequest,
     FigureResult,
     GroupScore,
     Recording,
+    Replay,
 )
 from infthor_eval.report.recordings.plan_pictures import plan_pictures
 from infthor_eval.report.recordings.room_map import draw_map
-from infthor_eval.report.suites.episode_columns import PLAN_COLUMNS
+from infthor_eval.report.suites.episodes import PLAN_COLUMNS, EpisodesPresenter
 from infthor_eval.report.suites.reward_curves import curves_on_page, curves_result, figure_section
 from infthor_eval.report.web.sections import Section
 from infthor_eval.run import Run
@@ -39,43 +34,23 @@ from infthor_eval.runs import UnitRecord
 from infthor_eval.tables import Table
 
 if TYPE_CHECKING:
-    from infthor_eval.plans.recorded.replay_frames import PlanFrame, PlanObservation
     from infthor_eval.plans.recorded.replaying import RecordedPlans
 
 Record = UnitRecord[PlanRecord]
 
 
-class PlansReplay:
-    """See `Replay`."""
+def _select_recorded(run: Run, selection: EpisodeSelection) -> Recording:
+    """Find the selected plans in a run; see `Replay.select`."""
+    from infthor_eval.plans.recorded.replaying import recorded_plans, replay_plans
 
-    unit = "plans"
-    options: Collection[str] = ("--plans",)
-    sheet_rows = 0
-
-    def select(self, run: Run, selection: EpisodeSelection) -> Recording:
-        """See `Replay.select`."""
-        from infthor_eval.plans.recorded.replaying import recorded_plans, replay_plans
-
-        recorded = recorded_plans(_plans_run(run), selection.task, selection.trajectory)
-        return Recording(
-            trajectory=recorded.trajectory,
-            tasks=recorded.tasks,
-            records=_select_plans(recorded, selection.plans),
-            simulator=recorded.run.config.simulator,
-            open=lambda data, scenes: replay_plans(recorded, data, scenes),
-        )
-
-    def draw_map(self, observation: "PlanObservation", size: int) -> Image.Image:
-        """See `Replay.draw_map`."""
-        return draw_map(observation, size)
-
-    def pictures(self, frames: Iterable["PlanFrame"], heading: str) -> Iterator[Image.Image]:
-        """See `Replay.pictures`."""
-        return plan_pictures(frames, heading)
-
-    def draw_sheet(self, frames: Iterable["PlanFrame"], heading: str) -> Image.Image:
-        """See `Replay.draw_sheet`: plans have none."""
-        raise NotImplementedError
+    recorded = recorded_plans(_plans_run(run), selection.task, selection.trajectory)
+    return Recording(
+        trajectory=recorded.trajectory,
+        tasks=recorded.tasks,
+        records=_select_plans(recorded, selection.plans),
+        simulator=recorded.run.config.simulator,
+        open=partial(replay_plans, recorded),
+    )
 
 
 def _select_plans(recorded: "RecordedPlans", plans: str | None) -> Sequence[Record]:
@@ -98,36 +73,22 @@ def _build_figure_7(runs: Sequence[Run], request: FigureRequest) -> FigureResult
     return curves_result(curves, request.panels)
 
 
-class PlansPresenter(PlainPresenter):
+class PlansPresenter(EpisodesPresenter):
     """See `PlainPresenter`."""
 
     title = "Plans"
     measure = "plans completed"
     finding = "completes {} of the plans"
     target_label = "goal"
-    reply_label = "ended"
-    main_metric = "success"
-    replay = PlansReplay()
+    replay = Replay("plans", ("--plans",), _select_recorded, draw_map, plan_pictures)
     columns = PLAN_COLUMNS
     figures: Mapping[str, Figure] = {
         "7": Figure("reward of plans over steps and over context tokens", _build_figure_7)
     }
 
-    def is_share(self, metric: str, scores: Sequence[float]) -> bool:
-        """See `PlainPresenter.is_share`."""
-        return metric == self.main_metric or metric in PAIR_BOUNDS
-
-    def bounds(self, metric: str) -> tuple[float, float]:
-        """See `PlainPresenter.bounds`: only rewards have none."""
-        return (-math.inf, math.inf) if metric == "reward" else PAIR_BOUNDS.get(metric, (0.0, 1.0))
-
-    def measure_of(self, task: str, summary: PlansSummary) -> str:
-        """See `PlainPresenter.measure_of`: of twins, pairs count."""
-        return self.measure if summary.tasks[task].twins is UNSET else NET_PAIRS
-
-    def finding_of(self, task: str, summary: PlansSummary) -> str:
-        """See `PlainPresenter.finding_of`."""
-        return self.finding if summary.tasks[task].twins is UNSET else PAIRS_FINDING
+    def has_pairs(self, task: str, summary: PlansSummary) -> bool:
+        """See `PlainPresenter.has_pairs`."""
+        return summary.tasks[task].twins is not UNSET
 
     def group_scores(self, records: Sequence[Record]) -> Iterator[GroupScore]:
         """See `PlainPresenter.group_scores`: net pairs of twins."""
@@ -149,14 +110,6 @@ class PlansPresenter(PlainPresenter):
     def describe(self, record: Record) -> Description:
         """See `PlainPresenter.describe`."""
         return Description(record.payload.plan, record.payload.goal, record.payload.kind)
-
-    def reply(self, record: Record) -> str:
-        """See `PlainPresenter.reply`: how the plan ended."""
-        return record.payload.ended
-
-    def details(self, record: Record) -> Mapping[str, str]:
-        """See `PlainPresenter.details`: the page shows all of it elsewhere."""
-        return {}
 
     def steps(self, record: Record) -> list[StepRow]:
         """See `PlainPresenter.steps`."""

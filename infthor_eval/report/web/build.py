@@ -13,7 +13,7 @@ from infthor_eval.report.headline.results import TaskResult, task_results
 from infthor_eval.report.headline.sentence import headline
 from infthor_eval.report.headline.tables import cost_chart, results_chart, results_table
 from infthor_eval.report.web.page import About, Page, SuiteLabels, embedded_remark
-from infthor_eval.report.web.progress import PageProgress, Silent
+from infthor_eval.report.web.progress import PageProgress
 from infthor_eval.report.web.replays import EpisodeReplays
 from infthor_eval.report.web.run_tables import costs_table, left_out_table
 from infthor_eval.report.web.sample_list import SharedTexts, build_samples
@@ -51,7 +51,7 @@ def build_page(
 ) -> Page:
     """Build the page of some runs, of one suite or of several; `progress` observes what takes
     long."""
-    progress = progress or Silent()
+    progress = progress or PageProgress()
     by_suite: dict[str, list[Run]] = {}
     progress.begin(_SUMMARIES, len(runs))
     for run in runs:

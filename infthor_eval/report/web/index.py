@@ -166,11 +166,6 @@ def _index_page(made: Iterable[_Made], failures: Sequence[tuple[str, str]]) -> P
     return Page(
         title=f"{len(read)} {'run' if len(read) == 1 else 'runs'}",
         version=infthor_eval.__version__,
-        runs=(),
-        suites={},
         sections=sections,
-        samples=(),
-        metrics=(),
-        pictures=(),
         remark=embedded_remark(which) if n_embedded else "",
     )

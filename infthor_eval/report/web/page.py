@@ -5,6 +5,7 @@ import json
 import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ from infthor_eval.report.svg import draw
 from infthor_eval.report.web.samples import FrameFacts, Numbered, PageSample, Prompt
 from infthor_eval.report.web.sections import Section
 
+_read = partial(read_part, __package__)
 _SCRIPTS = (
     "wide.js",
     "tables.js",
@@ -115,12 +117,12 @@ class Page:
 
     title: str
     version: str
-    runs: Sequence[About]
-    suites: Mapping[str, SuiteLabels]
-    sections: Sequence[Section]
-    samples: Sequence[PageSample]
-    metrics: Sequence[str]
-    pictures: Sequence[str]
+    runs: Sequence[About] = ()
+    suites: Mapping[str, SuiteLabels] = field(default_factory=dict)
+    sections: Sequence[Section] = ()
+    samples: Sequence[PageSample] = ()
+    metrics: Sequence[str] = ()
+    pictures: Sequence[str] = ()
     notes: Sequence[str] = ()
     is_packed: bool = False
     remark: str = ""
@@ -146,10 +148,6 @@ def write_page(page: Page, path: Path) -> int:
         style=[LOOK, _read("report.css")],
         script=[THEME, *map(_read, _SCRIPTS)],
     )
-
-
-def _read(name: str) -> str:
-    return read_part(__package__, name)
 
 
 def _data(page: Page) -> dict[str, Any]:

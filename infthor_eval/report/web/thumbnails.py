@@ -13,7 +13,7 @@ from typing import NamedTuple, TypeVar
 from PIL import Image
 
 from infthor_eval.errors import DataError
-from infthor_eval.report.web.progress import PageProgress, Silent
+from infthor_eval.report.web.progress import PageProgress
 
 _QUALITY = 55  # of WebP: 1 to 3 kB for a frame of 132 pixels, so that thousands fit into a page
 _EFFORT = 2  # of WebP: twice as fast as 4, pictures are 5 % larger
@@ -46,7 +46,7 @@ class ThumbnailStore:
             side: length of a thumbnail's longer side in pixels.
             progress: observes the pictures that are expected.
         """
-        self._progress = progress or Silent()
+        self._progress = progress or PageProgress()
         self._left = budget  # as enlarged pictures leave it
         self._side = side
         self._encoded: list[str] = []

@@ -8,11 +8,11 @@ from typing import Any
 
 import yaml
 
-from infthor_eval.errors import DataError, wrap_errors
+from infthor_eval.errors import DataError
 from infthor_eval.formats.yaml_files import read_yaml
 from infthor_eval.runs.request import RunRequest
 from infthor_eval.settings import settings_of
-from infthor_eval.storage.files import write_atomically, writing_hint
+from infthor_eval.storage.files import write_output, writing_hint
 
 _FILE = "run.yaml"
 _HEAD = (
@@ -54,15 +54,9 @@ class StoredCommand:
 
 def write_command(folder: Path, request: RunRequest) -> None:
     """Write `run.yaml` into a run's folder."""
-    path = folder / _FILE
     text = _HEAD + yaml.safe_dump(_options_of(request), sort_keys=False, allow_unicode=True)
-    with (
-        wrap_errors(
-            f"{path}: cannot be written",
-            writing_hint(" and run the same command again, which resumes it"),
-        ),
-        write_atomically(path) as partial,
-    ):
+    hint = writing_hint(" and run the same command again, which resumes it")
+    with write_output(folder / _FILE, hint) as partial:
         partial.write_text(text, encoding="utf-8")
 
 

@@ -1,24 +1,13 @@
 """Runs made without a driver, as replies are there already: stored like any other run."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from infthor_eval.runs.journals.journal import Journal
 from infthor_eval.runs.journals.records import Payload, RunHeader, SuiteUnit, UnitRecord
 from infthor_eval.runs.request import run_folder
-from infthor_eval.runs.results import write_run_files
-from infthor_eval.runs.suite import RunSummary, Session, Suite
-from infthor_eval.runs.usage import Usage
-
-
-@dataclass(frozen=True)
-class Stored:
-    """A run that was stored: its folder, its summary, and the usage of all requests."""
-
-    folder: Path
-    summary: RunSummary
-    usage: Usage
+from infthor_eval.runs.results import Stored, store_results
+from infthor_eval.runs.suite import Session, Suite
 
 
 def store_run(
@@ -27,7 +16,7 @@ def store_run(
     suite: Suite[SuiteUnit, Payload],
     make_records: Callable[[Session[Payload]], Sequence[UnitRecord[Payload]]],
     n_missing: int,
-) -> Stored:
+) -> Stored[Payload]:
     """Write journal and results of a run into its folder `<output>/<name>/<tasks>-<config hash>`.
 
     Records that the journal has already are not written again.
@@ -45,13 +34,7 @@ def store_run(
         for record in records:
             if not _is_stored(record, journal):
                 journal.append(record)
-        usage = Usage.total(
-            [record.usage for record in records]
-            + [artifact.usage for artifact in journal.artifacts]
-        )
-        summary = RunSummary.of(suite, header, records)
-        write_run_files(folder, summary, suite, records, n_missing, usage)
-    return Stored(folder, summary, usage)
+        return store_results(folder, suite, journal, records, n_missing)
 
 
 def _is_stored(record: UnitRecord[Payload], journal: Journal[Payload]) -> bool:

@@ -5,10 +5,9 @@ from pathlib import Path
 from typing import Any
 
 from infthor_eval.runs.journals.record_encoder import RecordEncoder
-from infthor_eval.runs.journals.records import Artifact, Unit, UnitRecord, describe_failure
+from infthor_eval.runs.journals.records import Unit, describe_failure
 from infthor_eval.runs.journals.shards import FOLDER
 from infthor_eval.runs.suite import BoundEvaluation, Session
-from infthor_eval.runs.usage import NOTHING, Usage
 from infthor_eval.runs.work.binding import group_records
 from model_adapters import BatchModel
 
@@ -41,23 +40,13 @@ def fetch_replies(
 
 
 class _Collecting:
-    """A session that writes nothing: failures are recorded when the units are evaluated."""
+    """A session that keeps no traceback: failures are told when the units are evaluated."""
 
     def __init__(self, session: Session[Any]) -> None:
-        self._session = session
-
-    def find_record(self, unit: Unit[Any], fingerprint: str) -> UnitRecord[Any] | None:
-        """See `Session`."""
-        return self._session.find_record(unit, fingerprint)
+        self.find_record = session.find_record
+        self.find_artifact = session.find_artifact
+        self.cache_artifact = session.cache_artifact
 
     def describe_failure(self, unit: Unit[Any], error: BaseException) -> str:
         """See `Session`; nothing is written."""
         return describe_failure(error)
-
-    def find_artifact(self, fingerprint: str, kind: type[Artifact]) -> Artifact | None:
-        """See `Session`."""
-        return self._session.find_artifact(fingerprint, kind)
-
-    def cache_artifact(self, fingerprint: str, artifact: Any, usage: Usage = NOTHING) -> None:
-        """See `Session`."""
-        self._session.cache_artifact(fingerprint, artifact, usage)

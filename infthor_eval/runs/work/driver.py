@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Generic, Protocol
 
@@ -11,10 +11,9 @@ from infthor_eval.runs.journals import journal as journals
 from infthor_eval.runs.journals.journal import Journal
 from infthor_eval.runs.journals.records import Payload, SuiteUnit, Unit, UnitRecord
 from infthor_eval.runs.request import PreparedRun
-from infthor_eval.runs.results import write_run_files
+from infthor_eval.runs.results import Stored, store_results
 from infthor_eval.runs.stored.command import write_command
-from infthor_eval.runs.suite import RunSummary, UnitDoc, Workload
-from infthor_eval.runs.usage import Usage
+from infthor_eval.runs.suite import UnitDoc, Workload
 from infthor_eval.runs.work.executor import Executor, LocalExecutor
 from infthor_eval.runs.work.worker_executor import WorkerPoolExecutor
 from model_adapters import Subject
@@ -47,22 +46,14 @@ class Silent:
 
 
 @dataclass(frozen=True)
-class RunOutcome(Generic[SuiteUnit, Payload]):
-    """A run that has ended.
+class RunOutcome(Stored[Payload], Generic[SuiteUnit, Payload]):
+    """A run that has ended; units are missing if it was stopped.
 
     Attributes:
-        records: records of all units that were attempted.
-        n_missing: number of units that were not attempted, as the run was stopped.
-        usage: usage of all requests, those for cached artifacts included.
         close_failure: why the subject or the suite could not be closed; None if it was.
     """
 
-    folder: Path
     run: PreparedRun[SuiteUnit, Payload]
-    summary: RunSummary
-    records: list[UnitRecord[Payload]]
-    n_missing: int
-    usage: Usage
     close_failure: str | None = None
 
     @property
@@ -100,16 +91,17 @@ def execute(
     observer = observer or Silent()
     executor = _start_executor(run, observer.notify, loaded)
     try:
-        outcome = _evaluate(run, executor, observer, should_stop)
+        stored = _evaluate(run, executor, observer, should_stop)
     except BaseException:
         with suppress(UserCodeError):  # what ended the run is told, not what failed after it
             executor.close()
         raise
+    failure = None
     try:
         executor.close()
     except UserCodeError as error:  # all results are there
-        return replace(outcome, close_failure=str(error))
-    return outcome
+        failure = str(error)
+    return RunOutcome(**vars(stored), run=run, close_failure=failure)
 
 
 def _evaluate(
@@ -117,7 +109,7 @@ def _evaluate(
     executor: Executor[Payload],
     observer: Observer,
     should_stop: Callable[[], bool],
-) -> RunOutcome[SuiteUnit, Payload]:
+) -> Stored[Payload]:
     header = executor.header
     workload = executor.workload
     folder = run.request.folder(header)
@@ -134,10 +126,9 @@ def _evaluate(
             raise
         # Stopped at once: the units that are done have their results all the same.
         except BaseException:
-            _write_results(run, folder, workload, journal)
+            _store_results(run, folder, workload, journal)
             raise
-        summary, records, usage = _write_results(run, folder, workload, journal)
-    return RunOutcome(folder, run, summary, records, workload.n_units - len(records), usage)
+        return _store_results(run, folder, workload, journal)
 
 
 def _start_executor(
@@ -148,21 +139,15 @@ def _start_executor(
     return WorkerPoolExecutor(run, notify)
 
 
-def _write_results(
+def _store_results(
     run: PreparedRun[SuiteUnit, Payload],
     folder: Path,
     workload: Workload[Unit[Any]],
     journal: Journal[Payload],
-) -> tuple[RunSummary, list[UnitRecord[Payload]], Usage]:
-    """Write the results of the units in the journal; return summary, records and usage."""
+) -> Stored[Payload]:
+    """Write the results of the units in the journal."""
     # The journal may hold more.
     keys = {unit.key for group in workload.groups for unit in group.units}
     records = [record for record in journal.records if record.key in keys]
     journal.check_file()
-    summary = RunSummary.of(run.suite, journal.header, records)
-    n_missing = workload.n_units - len(records)
-    usage = Usage.total(
-        [record.usage for record in records] + [artifact.usage for artifact in journal.artifacts]
-    )
-    write_run_files(folder, summary, run.suite, records, n_missing, usage)
-    return summary, records, usage
+    return store_results(folder, run.suite, journal, records, workload.n_units - len(records))

@@ -4,7 +4,7 @@ A model's switches (`model_adapters.switches`) are to save time or memory and to
 else. Whether they do depends on model, device and library, so it is tried.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from contextlib import closing
 from dataclasses import dataclass, field, replace
 
@@ -105,19 +105,17 @@ def _replies(
     bound: BoundRun[SuiteUnit, Payload], encoder: RecordEncoder[Payload], *, backwards: bool = False
 ) -> _Replies:
     """Return the replies by unit; a failure in its place, as it has to be the same."""
-    return dict(_each_reply(bound, encoder, -1 if backwards else 1))
-
-
-def _each_reply(
-    bound: BoundRun[SuiteUnit, Payload], encoder: RecordEncoder[Payload], step: int
-) -> Iterator[tuple[UnitKey, str]]:
     session = UnrecordedSession()
     evaluation = bound.evaluation
+    step = -1 if backwards else 1
+    replies = {}
     for group in evaluation.workload.groups[::step]:
         ordered = replace(group, units=group.units[::step])
         for record in group_records(evaluation, ordered, session, encoder):
             reply = bound.prepared.evaluation.to_doc(bound.header, record).reply
-            yield record.key, reply if record.failure is None else f"failed: {record.failure}"
+            failure = record.failure
+            replies[record.key] = reply if failure is None else f"failed: {failure}"
+    return replies
 
 
 def _n_differing(some: _Replies, others: _Replies) -> int:

@@ -7,6 +7,7 @@ nothing travels but numbers and records.
 
 from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, Generic
 
@@ -63,16 +64,6 @@ class _GroupJob(Generic[Payload]):
     portion: _Portion
     folder: Path
     earlier: tuple[UnitRecord[Payload], ...]
-
-
-@dataclass(frozen=True)
-class _OpenEvaluator(Generic[SuiteUnit, Payload]):
-    """Creates a worker in the process where it works; pickled and sent there."""
-
-    run: PreparedRun[SuiteUnit, Payload]
-
-    def __call__(self, number: int) -> "_Evaluator[SuiteUnit, Payload]":
-        return _Evaluator(self.run, number)
 
 
 def _without_inputs(group: Group[SuiteUnit]) -> Group[Unit[Any]]:
@@ -155,9 +146,8 @@ class WorkerPoolExecutor(Generic[SuiteUnit, Payload]):
         self._expected: RunConfig[Any] | None = None
         settings = run.request.worker_settings
         self._n_workers = settings.workers
-        self._pool = Pool(
-            settings.connect(_OpenEvaluator(run)), settings.workers, self._check_config
-        )
+        connect = settings.connect(partial(_Evaluator, run))
+        self._pool = Pool(connect, settings.workers, self._check_config)
         try:
             greeting: _Greeting = self._pool.open()
         except BaseException:

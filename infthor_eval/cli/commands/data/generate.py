@@ -98,9 +98,7 @@ if TYPE_CHECKING:
 @floor_plans_option
 @worker_options
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as one JSON object.")
-@click.pass_context
 def command(
-    context: click.Context,
     scenes: tuple[str | Path, ...],
     min_steps: int,
     min_subgoals: int,
@@ -118,7 +116,7 @@ def command(
     data: Path | None,
     as_json: bool,
     **workers: Any,
-) -> None:
+) -> int:
     """Generate trajectories: sample tasks, plan them, and run the plans in the embedded simulator.
 
     Trajectories in the folder are not generated again. Exit code 1 if one cannot be generated.
@@ -174,7 +172,7 @@ def command(
         _print(result.summary(), out, console())
     for failure in result.failures:
         notes.print(f"not generated: {failure}", style="red")
-    context.exit(1 if result.failures else 0)
+    return int(bool(result.failures))
 
 
 def _print(summary: GenerationSummary, out: Path, output: Console) -> None:

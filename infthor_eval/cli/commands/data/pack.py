@@ -23,8 +23,7 @@ _out = click.option("--out", required=True, type=PATH, help="Folder of the new s
 @example_command("pack", "infthor-eval pack SET --out PACKED")
 @click.argument("set_folder", metavar="SET", type=PATH)
 @_out
-@click.pass_context
-def pack(context: click.Context, set_folder: Path, out: Path) -> None:
+def pack(set_folder: Path, out: Path) -> int:
     """Write SET as few Parquet files, which every command reads as it reads the folder.
 
     The Hugging Face hub shows them, and `datasets` loads them: `load_dataset(OUT, "questions")`.
@@ -44,15 +43,14 @@ def pack(context: click.Context, set_folder: Path, out: Path) -> None:
         packed = pack_set(
             data, folder, advance=PacedBar(progress, out.name, n_trajectories).advance
         )
-    _finish(context, packed, out)
+    return _finish(packed, out)
 
 
 @example_command("unpack", "infthor-eval unpack PACKED --out SET")
 @click.argument("packed", metavar="PACKED", type=SET)
 @_out
 @click.option("--skip-damaged", is_flag=True, help="Leave out trajectories that cannot be read.")
-@click.pass_context
-def unpack(context: click.Context, packed: Path, out: Path, skip_damaged: bool) -> None:
+def unpack(packed: Path, out: Path, skip_damaged: bool) -> int:
     """Write a packed set as the folder that it was made of, byte for byte, without its card.
 
     Exit code 1 if a trajectory cannot be read, and is left out.
@@ -64,7 +62,7 @@ def unpack(context: click.Context, packed: Path, out: Path, skip_damaged: bool) 
         raise UsageError(f"{packed}: has no trajectories-*.parquet; give a packed set")
     with _new_folder(out) as folder:
         unpacked = unpack_set(packed, folder, skip_damaged=skip_damaged)
-    _finish(context, unpacked, out)
+    return _finish(unpacked, out)
 
 
 @contextmanager
@@ -82,7 +80,8 @@ def _new_folder(out: Path) -> Iterator[Path]:
             out.rmdir()
 
 
-def _finish(context: click.Context, packed: Packed, out: Path) -> None:
+def _finish(packed: Packed, out: Path) -> int:
+    """Print what was written and what was left out; return the exit code."""
     files = [path for path in out.rglob("*") if path.is_file()]
     size = sum(path.stat().st_size for path in files)
     print_line(
@@ -91,4 +90,4 @@ def _finish(context: click.Context, packed: Packed, out: Path) -> None:
     files_left_out = (f"{path}: {reason}" for path, reason in packed.left_out.items())
     for line in (*packed.damaged, *files_left_out):
         error_console().print(f"left out: {line}", style="red", markup=False)
-    context.exit(1 if packed.damaged else 0)
+    return int(bool(packed.damaged))

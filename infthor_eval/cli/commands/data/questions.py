@@ -20,8 +20,8 @@ from infthor_eval.cli.options.values import (
 )
 from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
 from infthor_eval.cli.progress.bar import PacedBar
-from infthor_eval.errors import UsageError, wrap_errors
-from infthor_eval.storage.files import hold_folder, prepare_file, refuse_overwrite, write_atomically
+from infthor_eval.errors import UsageError
+from infthor_eval.storage.files import hold_folder, prepare_file, refuse_overwrite, write_output
 from infthor_eval.terminal import console, error_console, print_line, progress_bar
 
 if TYPE_CHECKING:
@@ -67,9 +67,7 @@ if TYPE_CHECKING:
 )
 @click.option("--overwrite", is_flag=True, help="Replace a file that holds other questions.")
 @worker_options
-@click.pass_context
 def questions(
-    context: click.Context,
     folder: Path,
     out: Path,
     seed: int,
@@ -80,7 +78,7 @@ def questions(
     words: str,
     overwrite: bool,
     **workers: Any,
-) -> None:
+) -> int:
     """Generate questions on a replayed SET, in the words of the paper's Table 3.
 
     Exit code 1 if a trajectory of the set cannot be read.
@@ -110,7 +108,7 @@ def questions(
         notes.print(f"skipped, the checker disagrees: {question.traj_id}: {question.text}")
     for line in result.skipped:
         notes.print(f"skipped: {line}", style="red")
-    context.exit(1 if result.skipped else 0)
+    return int(bool(result.skipped))
 
 
 @example_command("moments", "infthor-eval moments SET --out SET/moments.csv")
@@ -130,16 +128,14 @@ def questions(
     help="Ask so many frames after the evidence, at both moments.",
 )
 @click.option("--overwrite", is_flag=True, help="Replace a file that holds other questions.")
-@click.pass_context
 def moments(
-    context: click.Context,
     folder: Path,
     out: Path,
     trajectories: Path | None,
     per_trajectory: int,
     rungs: str,
     overwrite: bool,
-) -> None:
+) -> int:
     """Pair moments of a SET: the same question at two of them has two answers.
 
     No second world is needed, and which moment is the later one tells nothing. Exit code 1 if a
@@ -172,7 +168,7 @@ def moments(
     _print_counts("by frames since the evidence", result.by_age, output)
     for line in result.skipped:
         notes.print(f"skipped: {line}", style="red")
-    context.exit(1 if result.skipped else 0)
+    return int(bool(result.skipped))
 
 
 def _write(out: Path, questions: Sequence[Question], overwrite: bool) -> None:
@@ -182,10 +178,7 @@ def _write(out: Path, questions: Sequence[Question], overwrite: bool) -> None:
     content = encode_questions(questions)
     if not overwrite:
         refuse_overwrite(out, content)
-    with (
-        wrap_errors(f"{out}: cannot be written", "give another --out"),
-        write_atomically(out) as partial,
-    ):
+    with write_output(out, "give another --out") as partial:
         partial.write_bytes(content)
 
 
@@ -226,9 +219,7 @@ def _write(out: Path, questions: Sequence[Question], overwrite: bool) -> None:
 @floor_plans_option
 @worker_options
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as one JSON object.")
-@click.pass_context
 def twins(
-    context: click.Context,
     trajectories: tuple[Path, ...],
     out: Path,
     kinds: str | None,
@@ -243,7 +234,7 @@ def twins(
     data: Path | None,
     as_json: bool,
     **workers: Any,
-) -> None:
+) -> int:
     """Make twins of trajectories (.json, .jsonl, .jsonl.gz, directories, sets).
 
     A twin is the same episode in a world with one thing changed, so that a question in the same
@@ -297,7 +288,7 @@ def twins(
         _print(summary, console())
     for line in summary.failures:
         notes.print(f"no twins: {line}", style="red")
-    context.exit(1 if summary.failures else 0)
+    return int(bool(summary.failures))
 
 
 def drafting_of(settings: TwinSettings, launched: Launch) -> DraftTwins:

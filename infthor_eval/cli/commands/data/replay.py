@@ -78,9 +78,7 @@ _SIZE = click.IntRange(1, 8192)  # pixels
 )
 @worker_options
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as one JSON object.")
-@click.pass_context
 def command(
-    context: click.Context,
     trajectories: tuple[Path, ...],
     out: Path,
     data: Path | None,
@@ -93,7 +91,7 @@ def command(
     ray_address: str | None,
     gpus_per_worker: float | None,
     **rendering: Any,
-) -> None:
+) -> int:
     """Replay trajectories (.json, .jsonl, .jsonl.gz, directories) into an NIEH set.
 
     Writes the first frame and one after each low-level action, the log of every frame, and the
@@ -138,7 +136,7 @@ def command(
         _print(summarise(replayed), console())
     for failure in replayed.failures[:_MAX_SHOWN]:
         notes.print(f"not replayed: {failure.message}", style="red")
-    context.exit(1 if replayed.failures else 0)
+    return int(bool(replayed.failures))
 
 
 def _print(summary: ReplaySummary, output: Console) -> None:

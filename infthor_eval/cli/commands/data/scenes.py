@@ -6,7 +6,7 @@ import click
 
 from infthor_eval.cli.help import ExampleGroup
 from infthor_eval.cli.options.values import PATH, SceneName, default_option, floor_plans_option
-from infthor_eval.storage.files import hold_folder, prepare_file, refuse_overwrite, write_atomically
+from infthor_eval.storage.files import hold_folder, prepare_file, refuse_overwrite, write_output
 from infthor_eval.terminal import print_line
 
 _PICTURES = (".png", ".jpg", ".jpeg")
@@ -29,7 +29,6 @@ def show(name: str, data: Path | None, out: Path | None, size: int, overwrite: b
 
     from PIL import Image
 
-    from infthor_eval.errors import wrap_errors
     from infthor_eval.thor.launch import embedded_launch
     from infthor_eval.thor.scenes import scene_pictures
     from infthor_eval.thor.simulator import Simulator
@@ -46,10 +45,7 @@ def show(name: str, data: Path | None, out: Path | None, size: int, overwrite: b
     sheet.save(picture, format=Image.registered_extensions()[path.suffix.lower()])
     if not overwrite:
         refuse_overwrite(path, picture.getvalue())
-    with (
-        wrap_errors(f"{path}: cannot be written", "give another place with --out"),
-        write_atomically(path) as partial,
-    ):
+    with write_output(path, "give another place with --out") as partial:
         partial.write_bytes(picture.getvalue())
     print_line(f"{name}: {path} (from above; from where most is seen)")
 

@@ -1,8 +1,14 @@
-"""Columns of plans and of episodes of arms in the table of samples."""
+"""What plans and episodes of arms have alike: their presenters' base, and columns of samples."""
 
+import math
+from collections.abc import Mapping, Sequence
 from operator import attrgetter
+from typing import Any
 
+from infthor_eval.pairs import PAIR_BOUNDS
+from infthor_eval.report.plain import PlainPresenter
 from infthor_eval.report.sample_columns import SampleColumn, payload_column
+from infthor_eval.runs import UnitRecord
 
 _EPISODE_COLUMNS = (
     payload_column("index", int),
@@ -43,3 +49,27 @@ ARM_COLUMNS = (
     payload_column("closest", float),
     payload_column("n_collisions", int),
 )
+
+
+class EpisodesPresenter(PlainPresenter):
+    """See `PlainPresenter`."""
+
+    reply_label = "ended"
+    main_metric = "success"
+
+    def is_share(self, metric: str, scores: Sequence[float]) -> bool:
+        """See `PlainPresenter.is_share`."""
+        return metric == self.main_metric or metric in PAIR_BOUNDS
+
+    def bounds(self, metric: str) -> tuple[float, float]:
+        """See `PlainPresenter.bounds`: only rewards have none."""
+        return (-math.inf, math.inf) if metric == "reward" else PAIR_BOUNDS.get(metric, (0.0, 1.0))
+
+    def reply(self, record: UnitRecord[Any]) -> str:
+        """See `PlainPresenter.reply`: how the episode ended."""
+        ended: str = record.payload.ended
+        return ended
+
+    def details(self, record: UnitRecord[Any]) -> Mapping[str, str]:
+        """See `PlainPresenter.details`: the page shows all of it elsewhere."""
+        return {}
