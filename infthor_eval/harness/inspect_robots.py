@@ -134,11 +134,12 @@ class InfthorArm:
         self.world.close()
 
     def _delta(self, numbers: list[float]) -> ArmDelta:
-        moved, gripper = tuple(numbers[:3]), numbers[-1]
+        x, y, z, *turn, gripper = numbers
         if self._turns:
-            return ArmDelta(moved, tuple(numbers[3:6]), gripper)
+            roll, pitch, yaw = turn
+            return ArmDelta((x, y, z), (roll, pitch, yaw), gripper)
         self._openness = min(1.0, max(0.0, self._openness + gripper))
-        return ArmDelta(moved, (0.0, 0.0, 0.0), self._openness)
+        return ArmDelta((x, y, z), (0.0, 0.0, 0.0), self._openness)
 
     def _observation(self, view: ArmView) -> Observation:
         state = {

@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from infthor_eval.cli.rehearsal import rehearse
+from infthor_eval.storage.folders import packaged_folder
 
 from ...helpers.bundled import BUNDLED
 from ...helpers.command_line import assert_refused
@@ -20,7 +21,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(rehearse, "_SECONDS", 0.05)
 
 
-NANO = str(BUNDLED.parents[1] / "models" / "qwen2.5-vl-nano")
+NANO = str(packaged_folder("models/qwen2.5-vl-nano"))
 
 
 def test_a_folders_model_is_rehearsed_on_a_sets_frames(run_cli: Any) -> None:
