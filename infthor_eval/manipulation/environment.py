@@ -5,8 +5,8 @@ simulator is in `infthor_eval/thor/transfer.py`.
 """
 
 import math
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 from infthor_eval.episodes.records import InfeasibleError
@@ -41,6 +41,7 @@ from infthor_eval.thor.view import (
 )
 from model_adapters import ArmDelta, ArmObservation
 
+Step = ArmDelta | Sequence[Call]  # of a policy, or calls of AI2-THOR's
 SUCCESS_RULES = 1  # part of a run's identity: another number when the code gives other successes
 _MAX_WAITS = 20  # until a released object lies still
 _HALVINGS = 8  # of the range of heights, to half a centimetre
@@ -173,7 +174,7 @@ class ArmEnvironment:
         self._n_steps = 0
         return self._outcome()
 
-    def step(self, action: ArmDelta | Sequence[Call]) -> ArmOutcome:
+    def step(self, action: Step) -> ArmOutcome:
         """Execute one step.
 
         Args:
@@ -197,6 +198,18 @@ class ArmEnvironment:
         self._is_over = ended is not None
         self._n_steps += 1
         return self._outcome(tuple(calls), tuple(refusals), ended)
+
+    def step_within(self, action: Step, max_steps: int) -> Iterator[tuple[Step, ArmOutcome]]:
+        """Execute one step of an episode of so many steps at most, and yield it with its outcome;
+        after the last one a policy's hand closes, if it is to close at the end."""
+        outcome = self.step(action)
+        if outcome.ended is None and self._n_steps >= max_steps:
+            if isinstance(action, ArmDelta) and self._closes_at_the_end:
+                yield action, outcome
+                action = self.closing_calls()
+                outcome = self.step(action)
+            outcome = replace(outcome, ended=outcome.ended or ArmEnded.LIMIT)
+        yield action, outcome
 
     def _outcome(
         self,
@@ -239,7 +252,7 @@ class ArmEnvironment:
         return self.closing_calls()
 
     @property
-    def closes_at_the_end(self) -> bool:
+    def _closes_at_the_end(self) -> bool:
         """Whether a policy's hand closes once, after its last step."""
         return self.episode.kind == ManipulationKind.PICKUP and self._grasp.closing is Closing.END
 

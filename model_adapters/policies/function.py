@@ -1,6 +1,7 @@
 """A function of a user's own file as a policy: `def act(image, instruction)`."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,32 +12,32 @@ from model_adapters.policies.policy import arm_deltas
 from model_adapters.protocols import ArmDelta, Capabilities
 
 
+@dataclass(frozen=True, eq=False)
 class FunctionPolicy:
     """A function that returns seven numbers, or several rows of them, for each view.
 
-    Args:
+    Attributes:
         name: name of the policy.
         call: the function.
         options: values of its further parameters.
     """
 
-    capabilities = Capabilities(counts_tokens=False, token_ids=False, deterministic=False)
+    name: str
+    call: Callable[..., Any]
+    options: dict[str, Any]
 
-    def __init__(self, name: str, call: Callable[..., Any], options: dict[str, Any]) -> None:
-        self.name = name
-        self._call = call
-        self._options = options
+    capabilities = Capabilities(counts_tokens=False, token_ids=False, deterministic=False)
 
     def identity(self) -> dict[str, Any]:
         """Return the options; the file's content is known by its digest."""
-        return dict(self._options)
+        return dict(self.options)
 
     def reset(self) -> None:
         """Do nothing: a function has no episodes."""
 
     def act(self, frame: FrameRef, instruction: str) -> tuple[ArmDelta, ...]:
         """Return the next steps; see `Policy.act`."""
-        steps = self._call(frame.load(), instruction, **self._options)
+        steps = self.call(frame.load(), instruction, **self.options)
         try:
             numbers = np.asarray(steps, dtype=np.float64)
         except (TypeError, ValueError, OverflowError) as error:

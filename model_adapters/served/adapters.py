@@ -1,13 +1,12 @@
 """The adapters of models behind a server, one for each dialect."""
 
-from collections.abc import Callable
 from dataclasses import fields
 from typing import Any, ClassVar
 from urllib.parse import urlsplit
 
 from model_adapters.served.anthropic import AnthropicDialect
 from model_adapters.served.gemini import GeminiDialect
-from model_adapters.served.model import Dialect, ServedModel
+from model_adapters.served.model import ServedModel
 from model_adapters.served.openai import OpenAIDialect
 from model_adapters.served.options import (
     AnthropicOptions,
@@ -22,7 +21,7 @@ class _ServedAdapter:
     """Base of the adapters, each with the options and the class of its dialect."""
 
     Options: ClassVar[type[ServedOptions]]
-    dialect: ClassVar[Callable[[str, Any], Dialect]]
+    dialect: ClassVar[type[Any]]
 
     @classmethod
     def build(cls, name: str, options: ServedOptions, seed: int) -> ServedModel:  # noqa: ARG003
