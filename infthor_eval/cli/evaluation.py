@@ -16,7 +16,7 @@ from infthor_eval.errors import ModelError, UsageError
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-    from infthor_eval.runs import PreparedRun, RunOutcome, RunRequest, Suite
+    from infthor_eval.runs import PreparedRun, RunOutcome
     from model_adapters import FramePolicy, Model, Policy
 
 # A model that every suite takes until it is loaded, which it is not.
@@ -42,16 +42,12 @@ class Evaluator:
         self._runs: list[PreparedRun] = []
 
     def __enter__(self) -> Evaluator:
-        from infthor_eval.cli.progress.undrawn import draw_missing
-        from infthor_eval.runs import prepare_all
         from infthor_eval.storage.scratch import ScratchFolder
 
         options = self._options
         if "out" not in options:
             options = {**options, "out": str(self._stack.enter_context(ScratchFolder()))}
-        requests = _requests(options)
-        draw_missing(requests)
-        self._runs = prepare_all(requests)
+        self._runs = _prepare(options)
         for run in self._runs:
             keep = getattr(run.evaluation, "keeping_simulators", None)
             if keep is not None:
@@ -115,33 +111,33 @@ def _tell_failures(outcome: RunOutcome) -> None:
 def evaluate(model: Any, options: Mapping[str, Any]) -> DataFrame:
     """See `infthor_eval.evaluate`; the options are taken as those of `--config` are."""
     from infthor_eval.cli.progress.runs import execute_runs
-    from infthor_eval.cli.progress.undrawn import draw_missing
     from infthor_eval.exports.lm_eval import export
     from infthor_eval.report.run_table import load_runs
-    from infthor_eval.runs import prepare_all
 
     if not isinstance(model, str):
         with Evaluator(**options) as evaluator:
             return load_runs(*(outcome.folder for outcome in evaluator.outcomes(model)))
-    requests = _requests({"model": model, **options})
-    draw_missing(requests)
-    runs = prepare_all(requests)
-    outcomes, is_stopped = execute_runs(runs, finish=export)
+    outcomes, is_stopped = execute_runs(_prepare({"model": model, **options}), finish=export)
     if is_stopped:
         raise KeyboardInterrupt
     return load_runs(*(outcome.folder for outcome in outcomes))
 
 
-def _requests(options: Mapping[str, Any]) -> list[tuple[RunRequest, Suite]]:
+def _prepare(options: Mapping[str, Any]) -> list[PreparedRun]:
+    """Return the runs of options, whose data have all their frames."""
     from infthor_eval.cli.commands.run import command
     from infthor_eval.cli.options.config import take_options
     from infthor_eval.cli.options.run import RunOptions
+    from infthor_eval.cli.progress.undrawn import draw_missing
+    from infthor_eval.runs import prepare_all
 
     try:
         context = click.Context(command, info_name="evaluate")
         take_options(context, options, "evaluate")
         with context.scope(cleanup=False):
             command.parse_args(context, [])
-            return list(RunOptions.from_click(context.params).requests())
+            requests = list(RunOptions.from_click(context.params).requests())
     except click.ClickException as error:
         raise UsageError(error.format_message()) from error
+    draw_missing(requests)
+    return prepare_all(requests)

@@ -222,18 +222,15 @@ class TransformersModel(HfModel):
     ) -> list[int]:
         """Decode replies one after the other; return how many tokens of each prompt were in the
         cache."""
-        return [
-            self._decode_one(prompt, reply) for prompt, reply in zip(prompts, replies, strict=True)
-        ]
-
-    def _decode_one(self, prompt: Sequence[Piece], reply: ReplyState) -> int:
-        shared = self._prefix.rewind_to(prompt)
-        cached = self._prefix.n_tokens
-        logits = self._prefix.feed(prompt[shared:], reserve=reply.decoding.max_new_tokens)
-        decode_replies(
-            logits[None], lambda tokens: self._prefix.step(list(tokens.values()))[None], [reply]
-        )
-        return cached
+        n_cached = []
+        for prompt, reply in zip(prompts, replies, strict=True):
+            shared = self._prefix.rewind_to(prompt)
+            n_cached.append(self._prefix.n_tokens)
+            logits = self._prefix.feed(prompt[shared:], reserve=reply.decoding.max_new_tokens)
+            decode_replies(
+                logits[None], lambda tokens: self._prefix.step(list(tokens.values()))[None], [reply]
+            )
+        return n_cached
 
     def _decode_behind_cuts(
         self, prompts: Sequence[Sequence[Piece]], cut: CacheCut, replies: Sequence[ReplyState]
