@@ -12,7 +12,7 @@ from typing import Any
 
 import msgspec
 
-from infthor_eval.errors import ModelError, in_one_line
+from infthor_eval.errors import ModelError, in_one_line, wrap_errors
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.quantities import Amount, Count
 from infthor_eval.storage.digests import json_values
@@ -229,24 +229,20 @@ def _require_reply(name: str, reply: Any) -> Reply:
             f"{name} gives {_in_words(reply)} for a reply; write `return Reply(text)`, with `from "
             "model_adapters import Reply`"
         )
-    try:
+    # A ValueError is msgspec's, or of lone surrogates.
+    problem = f"{name} gives a reply that cannot be kept"
+    with wrap_errors(problem, "fix the adapter", catch=ValueError, raise_as=ModelError):
         checked = msgspec.convert(reply, _ReplyLimits, from_attributes=True)
         for text in (checked.text, checked.thinking or "", *checked.faults):
             text.encode()
-    except ValueError as error:  # of msgspec, and of lone surrogates
-        raise ModelError(
-            f"{name} gives a reply that cannot be kept ({in_one_line(error)}); fix the adapter"
-        ) from error
     return reply
 
 
 def _require_count(name: str, what: str, count: Any) -> int | None:
-    try:
+    problem = f"{name} gives {count!r:.60} for {what}"
+    broken = msgspec.ValidationError
+    with wrap_errors(problem, "fix the adapter", catch=broken, raise_as=ModelError):
         checked: int | None = msgspec.convert(count, Count | None)
-    except msgspec.ValidationError as error:
-        raise ModelError(
-            f"{name} gives {count!r:.60} for {what} ({in_one_line(error)}); fix the adapter"
-        ) from error
     return checked
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from infthor_eval.errors import ModelError, in_one_line
+from infthor_eval.errors import ModelError, wrap_errors
 from infthor_eval.formats.frames import FrameRef
 from model_adapters.policies.policy import arm_deltas
 from model_adapters.protocols import ArmDelta, Capabilities
@@ -38,13 +38,13 @@ class FunctionPolicy:
     def act(self, frame: FrameRef, instruction: str) -> tuple[ArmDelta, ...]:
         """Return the next steps; see `Policy.act`."""
         steps = self.call(frame.load(), instruction, **self.options)
-        try:
+        problem = f"{self.name} returned {steps!r:.60}"
+        hint = (
+            "return seven numbers: x, y, z in metres, roll, pitch, yaw in radians, gripper 0 to 1"
+        )
+        broken = (TypeError, ValueError, OverflowError)
+        with wrap_errors(problem, hint, catch=broken, raise_as=ModelError):
             numbers = np.asarray(steps, dtype=np.float64)
-        except (TypeError, ValueError, OverflowError) as error:
-            raise ModelError(
-                f"{self.name} returned {steps!r:.60} ({in_one_line(error)}); return seven numbers: "
-                "x, y, z in metres, roll, pitch, yaw in radians, gripper 0 to 1"
-            ) from error
         return arm_deltas(self.name, numbers[None] if numbers.ndim == 1 else numbers)
 
     def close(self) -> None:

@@ -5,8 +5,8 @@ the expected keys are derived from the module, and a key that is missing, unknow
 shape is an error: a part that silently stayed random would spoil all results.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -23,15 +23,14 @@ Shape = tuple[int, ...]
 _MOST_KEYS = 3  # keys that an error lists
 
 
-@contextmanager
-def empty_parameters() -> Iterator[None]:
+def empty_parameters() -> AbstractContextManager[None]:
     """Create modules whose parameters take no memory, but whose buffers are real.
 
     Buffers are computed when a module is created and are not in a checkpoint; on the meta device
     they would be lost.
     """
-    with init_empty_weights(include_buffers=False):
-        yield
+    created: AbstractContextManager[None] = init_empty_weights(include_buffers=False)
+    return created
 
 
 @dataclass(frozen=True)

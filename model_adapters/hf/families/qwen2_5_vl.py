@@ -118,12 +118,8 @@ class Qwen25VL(CheckpointAdapter):
     model_types = ("qwen2_5_vl",)
 
 
-class Qwen25VLNano(CheckpointAdapter):
+class Qwen25VLNano(Qwen25VL):
     """The adapter `qwen2.5-vl-nano`."""
-
-    Options = PixelOptions
-    family = Qwen25VLFamily
-    model_types = ("qwen2_5_vl",)
 
     @classmethod
     def build(cls, name: str, options: CheckpointOptions, seed: int) -> TransformersModel:

@@ -133,8 +133,13 @@ class Rehearsal:
     @property
     def flash_problem(self) -> str:
         """Why the decoder cannot attend by flash-attn; empty if it can."""
-        heads = {call.head_size for call in self._probe}
-        return _flash_problem(self._rehearsed.model, max(heads), self._embed.sees_ahead)
+        if not getattr(self._rehearsed.model, "_supports_flash_attn", False):
+            return "the model's code does not support it"
+        largest = max(call.head_size for call in self._probe)
+        if largest > _LARGEST_HEAD:
+            return f"heads of {largest} are larger than {_LARGEST_HEAD}"
+        sees_ahead = self._embed.sees_ahead
+        return "it cannot attend in both directions over a frame" if sees_ahead else ""
 
     def usage(self, n_context: int) -> Usage:
         """Return the memory of a context of so many tokens."""
@@ -287,21 +292,6 @@ def _counted(calls: Sequence[Attention], n_context: int) -> Kernels:
         for call in calls
         if call.n_keys > n_context // 2
     )
-
-
-def _flash_problem(model: Any, largest_head: int, sees_ahead: bool) -> str:
-    """Return why a model cannot run with flash-attn; empty if it can.
-
-    Args:
-        model: the transformers model.
-        largest_head: numbers of its largest head.
-        sees_ahead: whether tokens of a frame attend to later ones of it.
-    """
-    if not getattr(model, "_supports_flash_attn", False):
-        return "the model's code does not support it"
-    if largest_head > _LARGEST_HEAD:
-        return f"heads of {largest_head} are larger than {_LARGEST_HEAD}"
-    return "it cannot attend in both directions over a frame" if sees_ahead else ""
 
 
 @contextmanager
