@@ -9,7 +9,7 @@ from infthor_eval.errors import ModelError
 from model_adapters.hf.cached.batch import answer_together, encode_together
 from model_adapters.hf.cached.branch_attention import layer_windows
 from model_adapters.hf.cached.decoding import ReplyState, decode_replies
-from model_adapters.hf.cached.prefix import Prefix
+from model_adapters.hf.cached.prefix import Prefix, PrefixStore
 from model_adapters.hf.cached.replies import begin_reply, end_reply
 from model_adapters.hf.checkpoint_model import HfModel
 from model_adapters.hf.global_settings import torch_threads
@@ -19,7 +19,6 @@ from model_adapters.hf.kept.cutting import (
     grouped,
     method_of,
 )
-from model_adapters.hf.kept.store import PrefixStore
 from model_adapters.hf.kept.view import CacheView
 from model_adapters.hf.limits import check_limit, wrap_memory_errors, wrap_model_errors
 from model_adapters.hf.loading.loaded import LoadedCheckpoint

@@ -268,10 +268,12 @@ class Rehearsal:
         }
 
     def _attention(self, run: Callable[[], Any]) -> Kernels:
-        """Return the calls of attention to the whole context."""
+        """Return the calls of attention to more than half of the context."""
         self._device.attention.clear()
         run()
-        return _counted(self._device.attention, self._prefix.n_tokens)
+        half = self._prefix.n_tokens // 2
+        calls = [call for call in self._device.attention if call.n_keys > half]
+        return Counter((call.kernel, call.has_mask, call.head_size) for call in calls)
 
     def _answer_together(self) -> None:
         """Encode questions together, as many as a trajectory of the published set has at most."""
@@ -283,15 +285,6 @@ class Rehearsal:
             continuations=[[_TOKEN] * _QUESTION] * min(options.batch_size, _TOGETHER),
             chunk_tokens=self._chunk_tokens,
         )
-
-
-def _counted(calls: Sequence[Attention], n_context: int) -> Kernels:
-    """Return the calls that attend to more than half of a context."""
-    return Counter(
-        (call.kernel, call.has_mask, call.head_size)
-        for call in calls
-        if call.n_keys > n_context // 2
-    )
 
 
 @contextmanager

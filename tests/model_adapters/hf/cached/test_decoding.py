@@ -3,7 +3,7 @@ import torch
 from transformers import GenerationConfig, TemperatureLogitsWarper, TopPLogitsWarper
 
 from infthor_eval.errors import ModelError
-from model_adapters.hf.cached.choices import Choices
+from model_adapters.hf.cached.decoding import Choices
 from model_adapters.hf.cached.decoding import (
     Generation,
     ReplyState,
