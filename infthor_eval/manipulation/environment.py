@@ -186,13 +186,13 @@ class ArmEnvironment:
         """
         if self._is_over:
             raise RuntimeError("no episode is under way; reset the environment to one")
-        movements = self._conversion.calls(action) if isinstance(action, ArmDelta) else list(action)
-        calls, refusals = self._run(movements)
+        calls = self._conversion.calls(action) if isinstance(action, ArmDelta) else list(action)
+        refusals = self._run(calls)
         if isinstance(action, ArmDelta):
             # After the movement, as the sphere holds other objects then.
-            gripper_calls, gripper_refusals = self._run(self._gripper(action))
-            calls = [*calls, *gripper_calls]
-            refusals = [*refusals, *gripper_refusals]
+            gripper_calls = self._gripper(action)
+            refusals += self._run(gripper_calls)
+            calls += gripper_calls
         released = any(call["action"] == "ReleaseObject" for call in calls)
         ended = self._ending(released)
         self._is_over = ended is not None
@@ -231,15 +231,10 @@ class ArmEnvironment:
         answer = self._simulator.query(action, **arguments)
         return answer.result if answer.success else None
 
-    def _run(self, calls: Iterable[Call]) -> tuple[list[Call], list[str]]:
-        done = []
-        refusals = []
-        for call in calls:
-            view = self._simulator.step(**call)
-            done.append(call)
-            if not view.success:
-                refusals.append(view.error or "refused without a message")
-        return done, refusals
+    def _run(self, calls: Iterable[Call]) -> list[str]:
+        """Execute calls; return the messages on those that are refused."""
+        views = [self._simulator.step(**call) for call in calls]
+        return [view.error or "refused without a message" for view in views if not view.success]
 
     def _gripper(self, delta: ArmDelta) -> list[Call]:
         """Return the calls of the gripper: it closes around something, or releases what it has."""

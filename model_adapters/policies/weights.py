@@ -8,7 +8,6 @@ shape is an error: a part that silently stayed random would spoil all results.
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import torch
@@ -17,6 +16,7 @@ from safetensors import safe_open
 from torch import nn
 
 from infthor_eval.errors import ModelError
+from model_adapters.policies.checkpoint import PolicyCheckpoint
 
 Shape = tuple[int, ...]
 
@@ -96,10 +96,8 @@ class Layout:
 
 def load_weights(
     module: nn.Module,
-    folder: Path,
+    checkpoint: PolicyCheckpoint,
     layout: Layout,
-    *,
-    pretrained: str,
     device: torch.device,
     dtype: torch.dtype,
 ) -> None:
@@ -108,13 +106,13 @@ def load_weights(
     Args:
         module: a module created within `empty_parameters()`. It ends up on the device; buffers keep
             their types.
-        folder: folder of the files.
+        checkpoint: the checkpoint.
         layout: expected keys.
-        pretrained: name of the checkpoint, for messages.
         device: device of the parameters.
         dtype: type of the parameters.
     """
-    paths = sorted(folder.glob("*.safetensors"))
+    pretrained = checkpoint.pretrained
+    paths = sorted(checkpoint.folder.glob("*.safetensors"))
     if not paths:
         raise ModelError(
             f"{pretrained} has no *.safetensors file; give a checkpoint with weights in that format"

@@ -128,13 +128,7 @@ class TransformersModel(HfModel):
         common = n_common([prompt[:-1] for prompt in prompts])
         self._prefix.reset()
         self._prefix.feed(prompts[0][:common])
-        return encode_together(
-            self._loaded.model,
-            self._embed,
-            prefix=self._prefix,
-            continuations=[prompt[common:] for prompt in prompts],
-            chunk_tokens=self._chunk_tokens,
-        )
+        return encode_together(self._prefix, [prompt[common:] for prompt in prompts])
 
     def answer_each(
         self, conversations: Sequence[Sequence[Turn]], decoding: Decoding
@@ -242,25 +236,17 @@ class TransformersModel(HfModel):
                 "rotary frequencies depend on the length; use a memory of frames"
             )
         asks = method_of(cut).asks
-        config = self._loaded.model.get_decoder().config
         n_cached: list[int] = []
         kept: list[KeptCache | None] = []
         for group in grouped(prompts, together=not asks):
             prefix, n_known = self._encoded.encode(group.before, exactly=asks)
             view = CacheView.of(prefix, group.before, group.n_opening, cut)
             if asks:
-                view.attention = attention_of(prefix, config, group.afters[0])
+                view.attention = attention_of(prefix, group.afters[0])
             n_before = len(group.before)
-            cut_prefix = CutPrefix(config, view, cut, prefix.behind(n_before))
-            answer_together(
-                self._loaded.model,
-                self._embed,
-                prefix=cut_prefix,
-                prompts=group.afters,
-                n_shared=[0] * len(group.afters),
-                replies=[replies[number] for number in group.numbers],
-                chunk_tokens=self._chunk_tokens,
-            )
+            cut_prefix = CutPrefix(prefix, view, cut, prefix.behind(n_before))
+            own = [replies[number] for number in group.numbers]
+            answer_together(cut_prefix, group.afters, [0] * len(own), own)
             known = [n_known, *[n_before] * (len(group.afters) - 1)]
             n_cached += map(prefix.tokens_in, known)
             kept += [cut_prefix.kept] * len(group.afters)
@@ -280,14 +266,6 @@ class TransformersModel(HfModel):
         n_cached = self._prefix.n_tokens
         if cached < most:
             self._prefix.feed(longest[cached:most])
-        answer_together(
-            self._loaded.model,
-            self._embed,
-            prefix=self._prefix,
-            prompts=prompts,
-            n_shared=n_shared,
-            replies=replies,
-            chunk_tokens=self._chunk_tokens,
-        )
+        answer_together(self._prefix, prompts, n_shared, replies)
         in_cache = [self._prefix.tokens_in(n) for n in n_shared]
         return [min(n_cached, in_cache[0]), *in_cache[1:]]

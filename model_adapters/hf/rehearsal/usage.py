@@ -277,14 +277,8 @@ class Rehearsal:
 
     def _answer_together(self) -> None:
         """Encode questions together, as many as a trajectory of the published set has at most."""
-        options = self._rehearsed.options
-        encode_together(
-            self._rehearsed.model,
-            self._embed,
-            prefix=self._prefix,
-            continuations=[[_TOKEN] * _QUESTION] * min(options.batch_size, _TOGETHER),
-            chunk_tokens=self._chunk_tokens,
-        )
+        n_questions = min(self._rehearsed.options.batch_size, _TOGETHER)
+        encode_together(self._prefix, [[_TOKEN] * _QUESTION] * n_questions)
 
 
 @contextmanager
