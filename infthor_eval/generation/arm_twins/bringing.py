@@ -196,13 +196,11 @@ def _stands(
     """Yield pairs of poses from which the surface is seen, side by side, in random order."""
     restore(simulator, scene)
     grid = reachable_grid(simulator)
-    standing = (
-        GridPose(cell, facing) for cell in sorted(grid.cells) for facing in (0, 90, 180, 270)
-    )
     poses = [
-        Viewpoint(pose, _HORIZON)
-        for pose in standing
-        if _faces(grid.position(pose.cell), pose.facing, errand.surface)
+        Viewpoint(GridPose(cell, facing), _HORIZON)
+        for cell in sorted(grid.cells)
+        for facing in (0, 90, 180, 270)
+        if _faces(grid.position(cell), facing, errand.surface)
     ]
     pairs = [pair for pair in permutations(poses, 2) if _side_by_side(grid, *pair)]
     rng.shuffle(pairs)
