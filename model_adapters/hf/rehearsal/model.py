@@ -91,11 +91,10 @@ def load_shapes(options: CheckpointOptions) -> RehearsedModel:
 
 def _refuse_options(options: CheckpointOptions) -> None:
     for name in ("kv_offload", "quantization", "attention"):
-        if not getattr(options, name):
-            continue
-        raise UsageError(
-            f"{name} cannot be rehearsed: memory would be counted wrongly; leave it out"
-        )
+        if getattr(options, name):
+            raise UsageError(
+                f"{name} cannot be rehearsed: memory would be counted wrongly; leave it out"
+            )
 
 
 def _load(options: CheckpointOptions, source: str) -> RehearsedModel:

@@ -7,7 +7,7 @@ allocated at a time is the memory of the context.
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -195,17 +195,15 @@ class Rehearsal:
     @contextmanager
     def _running(self) -> Iterator[None]:
         model = self._rehearsed.model
-        with ExitStack() as stack:
-            stack.enter_context(torch.inference_mode())
-            if self._flash:
-                decoder = model.get_decoder().config
-                stack.enter_context(_flash_attention(decoder, self._device))
+        decoder = model.get_decoder().config
+        problem = f"{model.config.model_type} cannot be rehearsed"
+        with (
+            torch.inference_mode(),
+            _flash_attention(decoder, self._device) if self._flash else nullcontext(),
             # Any error is possible: code that needs numbers finds none.
-            problem = f"{model.config.model_type} cannot be rehearsed"
-            stack.enter_context(
-                wrap_errors(problem, "measure on a GPU", catch=Exception, raise_as=ModelError)
-            )
-            stack.enter_context(self._device.running())
+            wrap_errors(problem, "measure on a GPU", catch=Exception, raise_as=ModelError),
+            self._device.running(),
+        ):
             yield
 
     def _frame(self, number: int) -> list[Piece]:
