@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from typing import Protocol
 
+from infthor_eval.formats.frames import FrameRef
 from model_adapters.protocols import Capabilities, Decoding, Part, Reply, Turn
 from model_adapters.refusals import check_decoding, check_turns
 from model_adapters.transcript import Transcript
@@ -68,3 +69,23 @@ class BackendConversation(Transcript):
         turns = self.turns_with(continuation)
         check_turns(self._backend.name, self._backend.capabilities, turns)
         return turns
+
+
+class UncountedBackend:
+    """Base of back ends that count no tokens and answer one conversation after the other."""
+
+    def tokens_per_frame(self, frame: FrameRef) -> None:
+        """Return None: tokens are not counted."""
+
+    def count(self, turns: Sequence[Turn]) -> None:
+        """Return None: tokens are not counted."""
+
+    def conversation(self: Backend) -> BackendConversation:
+        """Return a new, empty conversation."""
+        return BackendConversation(self)
+
+    def answer_each(
+        self: Backend, conversations: Sequence[Sequence[Turn]], decoding: Decoding
+    ) -> list[Reply]:
+        """See `Backend`."""
+        return [self.answer(turns, decoding) for turns in conversations]

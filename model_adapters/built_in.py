@@ -176,5 +176,7 @@ BUILT_IN = {
     "vla-eval": _locate(
         "remote_policies.vla_eval:VlaEval", "options.policies:SocketPolicyOptions", _VLA_EVAL
     ),
-    "vla-http": _locate("policies.http.adapter:VlaHttp", "options.policies:VlaHttpOptions", _HTTP),
+    "vla-http": _locate(
+        "policies.http.adapter:HttpPolicy", "options.policies:VlaHttpOptions", _HTTP
+    ),
 }

@@ -15,7 +15,7 @@ from PIL import Image
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.plugins import import_target
-from model_adapters.backend import BackendConversation
+from model_adapters.backend import UncountedBackend
 from model_adapters.own_function import OwnFunction, read_function
 from model_adapters.protocols import Capabilities, Decoding, FramePolicy, Model, Reply, Turn
 from model_adapters.thinking import cut_at_stop
@@ -54,59 +54,43 @@ class FunctionAdapter:
         return FunctionModel(name, self.function, values)
 
 
-class FunctionModel:
+@dataclass(frozen=True, eq=False)
+class FunctionModel(UncountedBackend):
     """A function that replies to a whole conversation.
 
-    Args:
+    Attributes:
         name: name of the model.
         function: takes all images in time order and all texts as one, or both in order (`parts`).
         options: values of its further parameters.
     """
 
+    name: str
+    function: OwnFunction
+    options: dict[str, Any]
+
     # Whether it repeats itself is unknown, so that nobody relies on it.
     capabilities = Capabilities(counts_tokens=False, token_ids=False, deterministic=False)
 
-    def __init__(self, name: str, function: OwnFunction, options: dict[str, Any]) -> None:
-        self.name = name
-        self._function = function
-        self._options = options
-
     def identity(self) -> dict[str, Any]:
         """Return the options; the file's content is known by its digest."""
-        return dict(self._options)
-
-    def tokens_per_frame(self, frame: FrameRef) -> None:
-        """Return None: tokens are not counted."""
-
-    def conversation(self) -> BackendConversation:
-        """Return a new, empty conversation."""
-        return BackendConversation(self)
+        return dict(self.options)
 
     def close(self) -> None:
         """Do nothing: what the function keeps ends with the process."""
 
-    def count(self, turns: Sequence[Turn]) -> None:
-        """Return None: tokens are not counted."""
-
     def answer(self, turns: Sequence[Turn], decoding: Decoding) -> Reply:
         """Return what the function returns, cut at the first stop string."""
         parts = _parts_of(turns)
-        if self._function.takes == _PARTS:
-            text = self._function.call(parts, **self._options)
+        if self.function.takes == _PARTS:
+            text = self.function.call(parts, **self.options)
         else:
             images = [part for part in parts if not isinstance(part, str)]
             words = "".join(part for part in parts if isinstance(part, str))
-            text = self._function.call(images, words, **self._options)
+            text = self.function.call(images, words, **self.options)
         if not isinstance(text, str):
             raise ModelError(f'{self.name} returned {text!r:.60}; return a text: `return "yes"`')
         cut = cut_at_stop(text, decoding.stop)
         return Reply(text if cut is None else cut)
-
-    def answer_each(
-        self, conversations: Sequence[Sequence[Turn]], decoding: Decoding
-    ) -> list[Reply]:
-        """Answer one after the other."""
-        return [self.answer(turns, decoding) for turns in conversations]
 
 
 def _parts_of(turns: Sequence[Turn]) -> list[str | Image.Image]:

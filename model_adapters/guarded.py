@@ -7,12 +7,12 @@ generator without end.
 To add or change what an adapter may give: here; the contract in words is `docs/own-models.md`.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import msgspec
 
-from infthor_eval.errors import ModelError, in_one_line
+from infthor_eval.errors import ModelError, in_one_line, wrap_errors
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.quantities import Amount, Count
 from infthor_eval.storage.digests import json_values
@@ -91,43 +91,54 @@ def identity_of(subject: Subject) -> dict[str, Any]:
 
 
 class _Guarded:
-    """What models and policies have in common; members beyond the protocol are the adapter's."""
+    """What is behind a guard; members beyond those of its protocol are its own."""
 
-    def __init__(self, name: str, capabilities: Capabilities, adapter: Any) -> None:
-        self.name = name
-        self.capabilities = capabilities
-        self._adapter = adapter
+    def __init__(self, name: str, behind: Any) -> None:
+        self._name = name
+        self._behind = behind
 
     def __getattr__(self, name: str) -> Any:
-        if name == "_adapter":  # not there yet, while a copy is made
+        if name == "_behind":  # not there yet, while a copy is made
             raise AttributeError(name)
-        return getattr(self._adapter, name)
+        return getattr(self._behind, name)
+
+    def _call(self, method: str, *args: Any, **kwargs: Any) -> Any:
+        """Return what a method returns; whatever it raises is a failure of the request."""
+        with wrap_request_errors(self._name):
+            return getattr(self._behind, method)(*args, **kwargs)
+
+
+class _GuardedSubject(_Guarded):
+    """What models and policies have in common."""
+
+    def __init__(self, name: str, capabilities: Capabilities, adapter: Any) -> None:
+        super().__init__(name, adapter)
+        self.name = name
+        self.capabilities = capabilities
 
     def identity(self) -> dict[str, Any]:
         """See `Subject`."""
         with wrap_adapter_errors(f"{self.name}: identity() fails"):
-            identity: dict[str, Any] = self._adapter.identity()
+            identity: dict[str, Any] = self._behind.identity()
             return identity
 
     def close(self) -> None:
         """See `Subject`."""
         with wrap_closing(self.name):
-            self._adapter.close()
+            self._behind.close()
 
 
-class _GuardedModel(_Guarded):
+class _GuardedModel(_GuardedSubject):
     """See `Model`."""
 
     def tokens_per_frame(self, frame: FrameRef) -> int | None:
         """See `Model`."""
-        with wrap_request_errors(self.name):
-            count = self._adapter.tokens_per_frame(frame)
+        count = self._call("tokens_per_frame", frame)
         return _require_count(self.name, "tokens_per_frame", count)
 
     def conversation(self) -> Conversation:
         """See `Model`."""
-        with wrap_request_errors(self.name):
-            return _GuardedConversation(self.name, self._adapter.conversation())
+        return _GuardedConversation(self.name, self._call("conversation"))
 
 
 class _GuardedPerson(_GuardedModel):
@@ -135,57 +146,44 @@ class _GuardedPerson(_GuardedModel):
 
     def show_notice(self, notice: Notice) -> None:
         """See `PersonModel`."""
-        with wrap_request_errors(self.name):
-            self._adapter.show_notice(notice)
+        self._call("show_notice", notice)
 
     def show_position(self, number: int, n_units: int) -> None:
         """See `PersonModel`."""
-        with wrap_request_errors(self.name):
-            self._adapter.show_position(number, n_units)
+        self._call("show_position", number, n_units)
 
 
-class _GuardedConversation:
+class _GuardedConversation(_Guarded):
     """See `Conversation`."""
-
-    def __init__(self, name: str, conversation: Conversation) -> None:
-        self._name = name
-        self._conversation = conversation
-
-    def __getattr__(self, name: str) -> Any:
-        if name == "_conversation":
-            raise AttributeError(name)
-        return getattr(self._conversation, name)
 
     @property
     def n_tokens(self) -> int | None:
         """See `Conversation`."""
         with wrap_request_errors(self._name):
-            count = self._conversation.n_tokens
+            count = self._behind.n_tokens
         return _require_count(self._name, "n_tokens", count)
 
     def append(self, *parts: Part, role: Role = "user") -> None:
         """See `Conversation`."""
-        self._call(lambda: self._conversation.append(*parts, role=role))
+        self._call("append", *parts, role=role)
 
     def mark(self) -> Mark:
         """See `Conversation`."""
-        mark: Mark = self._call(self._conversation.mark)
+        mark: Mark = self._call("mark")
         return mark
 
     def rewind(self, mark: Mark) -> None:
         """See `Conversation`."""
-        self._call(lambda: self._conversation.rewind(mark))
+        self._call("rewind", mark)
 
     def reply(self, decoding: Decoding) -> Reply:
         """See `Conversation`."""
-        reply = self._call(lambda: self._conversation.reply(decoding))
-        return _require_reply(self._name, reply)
+        return _require_reply(self._name, self._call("reply", decoding))
 
     def replies(self, continuations: Sequence[Sequence[Part]], decoding: Decoding) -> list[Reply]:
         """See `Conversation`."""
         # A list of its own: the adapter may change what it is given.
-        given = [list(parts) for parts in continuations]
-        replies = self._call(lambda: self._conversation.replies(given, decoding))
+        replies = self._call("replies", [list(parts) for parts in continuations], decoding)
         if not isinstance(replies, list | tuple) or len(replies) != len(continuations):
             raise ModelError(
                 f"{self._name} gives {_in_words(replies)} for {len(continuations)} continuations; "
@@ -193,23 +191,17 @@ class _GuardedConversation:
             )
         return [_require_reply(self._name, reply) for reply in replies]
 
-    def _call(self, call: Callable[[], Any]) -> Any:
-        with wrap_request_errors(self._name):
-            return call()
 
-
-class _GuardedPolicy(_Guarded):
+class _GuardedPolicy(_GuardedSubject):
     """See `Policy`."""
 
     def begin(self, episode: Episode) -> None:
         """See `Policy`."""
-        with wrap_request_errors(self.name):
-            self._adapter.begin(episode)
+        self._call("begin", episode)
 
     def act(self, *seen: Any) -> tuple[ArmDelta, ...]:
         """See `Policy`; what its steps hold is checked where they are executed."""
-        with wrap_request_errors(self.name):
-            chunk = self._adapter.act(*seen)
+        chunk = self._call("act", *seen)
         if not isinstance(chunk, list | tuple):
             raise ModelError(
                 f"{self.name} gives {_in_words(chunk)} for its next steps; give a tuple of ArmDelta"
@@ -218,19 +210,17 @@ class _GuardedPolicy(_Guarded):
 
     def end(self, *, success: bool | None) -> None:
         """See `Policy`."""
-        with wrap_request_errors(self.name):
-            self._adapter.end(success=success)
+        self._call("end", success=success)
 
 
-class _GuardedFramePolicy(_Guarded):
+class _GuardedFramePolicy(_GuardedSubject):
     """See `FramePolicy`."""
 
     act = _GuardedPolicy.act
 
     def reset(self) -> None:
         """See `FramePolicy`."""
-        with wrap_request_errors(self.name):
-            self._adapter.reset()
+        self._call("reset")
 
 
 def _require_reply(name: str, reply: Any) -> Reply:
@@ -239,24 +229,20 @@ def _require_reply(name: str, reply: Any) -> Reply:
             f"{name} gives {_in_words(reply)} for a reply; write `return Reply(text)`, with `from "
             "model_adapters import Reply`"
         )
-    try:
+    # A ValueError is msgspec's, or of lone surrogates.
+    problem = f"{name} gives a reply that cannot be kept"
+    with wrap_errors(problem, "fix the adapter", catch=ValueError, raise_as=ModelError):
         checked = msgspec.convert(reply, _ReplyLimits, from_attributes=True)
         for text in (checked.text, checked.thinking or "", *checked.faults):
             text.encode()
-    except ValueError as error:  # of msgspec, and of lone surrogates
-        raise ModelError(
-            f"{name} gives a reply that cannot be kept ({in_one_line(error)}); fix the adapter"
-        ) from error
     return reply
 
 
 def _require_count(name: str, what: str, count: Any) -> int | None:
-    try:
+    problem = f"{name} gives {count!r:.60} for {what}"
+    broken = msgspec.ValidationError
+    with wrap_errors(problem, "fix the adapter", catch=broken, raise_as=ModelError):
         checked: int | None = msgspec.convert(count, Count | None)
-    except msgspec.ValidationError as error:
-        raise ModelError(
-            f"{name} gives {count!r:.60} for {what} ({in_one_line(error)}); fix the adapter"
-        ) from error
     return checked
 
 

@@ -102,10 +102,10 @@ class Decoding:
     def document(self) -> dict[str, Any]:
         """Return all settings as JSON values, for fingerprints; a penalty that is the checkpoint's
         own is left out."""
-        settings = {name: value for name, value in asdict(self).items() if value is not None}
         return {
             name: list(value) if isinstance(value, tuple) else value
-            for name, value in settings.items()
+            for name, value in asdict(self).items()
+            if value is not None
         }
 
 

@@ -53,7 +53,7 @@ KNOWN = {
     "NIEH, STRICT_RULES": ("3", "c6d20215bda257fb"),
     "plans, `version` of `default` in rewards.yaml": (1, "44e8566f72e9eafd"),
     "plans, `version` of `published` in rewards.yaml": (1, "47022a5010ab61f0"),
-    "manipulation, SUCCESS_RULES": (1, "676de4d610f1113a"),
+    "manipulation, SUCCESS_RULES": (1, "95d0eef3f130b674"),
 }
 GOLDEN = ("3", "8706689b01e7ae64")
 

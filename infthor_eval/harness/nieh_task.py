@@ -120,14 +120,11 @@ def _mean(sides: Sequence[_Side], metric: str) -> float:
     for side in sides:
         if side.pair:
             pairs.setdefault((side.pair, side.variant), []).append(side)
-    whole = [both for both in pairs.values() if len(both) == 2 and not _is_placebo(*both)]
-    scores = [_shares(*both).by_metric[metric] for both in whole]
+    whole = [both for both in pairs.values() if len(both) == 2]
+    # A pair with one answer, a placebo, tells nothing of memory.
+    telling = [(one, two) for one, two in whole if one.answers != two.answers]
+    scores = [_shares(*both).by_metric[metric] for both in telling]
     return fmean(scores) if scores else 0.0
-
-
-def _is_placebo(one: _Side, two: _Side) -> bool:
-    """Return True for a pair with one answer, which tells nothing of memory."""
-    return one.answers == two.answers
 
 
 def _shares(one: _Side, two: _Side) -> PairShares:

@@ -9,7 +9,7 @@ import importlib.util
 import inspect
 import logging
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
@@ -34,64 +34,63 @@ class Trackers:
     ) -> None:
         """Check the arguments of `wandb.init`, `trackio.init`, `EvaluationTracker`; None if
         unused."""
-        self._wandb = _init_arguments("wandb", wandb_args)
-        self._trackio = _init_arguments("trackio", trackio_args)
-        self._hub = _hub_arguments(hf_hub_log_args)
+        trackers = (
+            ("Weights & Biases", _to_wandb, _init_arguments("wandb", wandb_args)),
+            ("trackio", _to_trackio, _init_arguments("trackio", trackio_args)),
+            ("the hub", _to_hub, _hub_arguments(hf_hub_log_args)),
+        )
+        self._used = [(service, send, args) for service, send, args in trackers if args is not None]
 
     def send(self, outcome: RunOutcome) -> None:
         """Send a run to all trackers."""
-        trackers: dict[str, tuple[Callable[[Exported, str], None], Any]] = {
-            "Weights & Biases": (self._to_wandb, self._wandb),
-            "trackio": (self._to_trackio, self._trackio),
-            "the hub": (self._to_hub, self._hub),
-        }
-        used = {service: send for service, (send, args) in trackers.items() if args is not None}
-        converted = convert_run(outcome) if used else None
-        for service, send in used.items():
-            assert converted is not None
+        if not self._used:
+            return
+        converted = convert_run(outcome)
+        for service, send, args in self._used:
             problem = f"{outcome.folder}: could not be sent to {service}"
             with wrap_errors(problem, "run the same command again", catch=Exception):
-                send(converted, outcome.summary.header.name)
+                send(converted, outcome.summary.header.name, args)
 
-    def _to_wandb(self, run: Exported, name: str) -> None:
-        from lm_eval.loggers import WandbLogger
 
-        logger = WandbLogger({"name": name, **(self._wandb or {})})
-        try:
-            logger.post_init(run.results)
+def _to_wandb(run: Exported, name: str, args: Mapping[str, Any]) -> None:
+    from lm_eval.loggers import WandbLogger
+
+    logger = WandbLogger({"name": name, **args})
+    try:
+        logger.post_init(run.results)
+        logger.log_eval_result()
+        logger.log_eval_samples(_as_evaluated(run))
+    finally:
+        logger.run.finish()
+
+
+def _to_trackio(run: Exported, name: str, args: Mapping[str, Any]) -> None:
+    from lm_eval.loggers import TrackioLogger
+
+    logger = TrackioLogger({"name": name, **args})
+    try:
+        logger.post_init(run.results)
+        with _raise_failures("lm_eval.loggers.trackio_logger"):
             logger.log_eval_result()
             logger.log_eval_samples(_as_evaluated(run))
-        finally:
-            logger.run.finish()
+    finally:
+        logger.finish()
 
-    def _to_trackio(self, run: Exported, name: str) -> None:
-        from lm_eval.loggers import TrackioLogger
 
-        logger = TrackioLogger({"name": name, **(self._trackio or {})})
-        try:
-            logger.post_init(run.results)
-            with _raise_failures("lm_eval.loggers.trackio_logger"):
-                logger.log_eval_result()
-                logger.log_eval_samples(_as_evaluated(run))
-        finally:
-            logger.finish()
+def _to_hub(run: Exported, name: str, args: Mapping[str, Any]) -> None:
+    from lm_eval.loggers import EvaluationTracker
 
-    def _to_hub(self, run: Exported, name: str) -> None:
-        from lm_eval.loggers import EvaluationTracker
-
-        with (
-            ScratchFolder() as folder,
-            _raise_failures("lm_eval.loggers.evaluation_tracker"),
-        ):
-            tracker = EvaluationTracker(output_path=str(folder), **(self._hub or {}))
-            tracker.general_config_tracker.log_experiment_args(
-                NAME, {"model": name}, None, None, False
-            )
-            samples = _as_evaluated(run)
-            tracker.save_results_aggregated(dict(run.results), samples)
-            for task, rows in samples.items():
-                tracker.save_results_samples(task, rows)
-            tracker.recreate_metadata_card()
+    with (
+        ScratchFolder() as folder,
+        _raise_failures("lm_eval.loggers.evaluation_tracker"),
+    ):
+        tracker = EvaluationTracker(output_path=str(folder), **args)
+        tracker.general_config_tracker.log_experiment_args(NAME, {"model": name}, None, None, False)
+        samples = _as_evaluated(run)
+        tracker.save_results_aggregated(dict(run.results), samples)
+        for task, rows in samples.items():
+            tracker.save_results_samples(task, rows)
+        tracker.recreate_metadata_card()
 
 
 def _init_arguments(package: str, typed: Arguments | None) -> dict[str, Any] | None:

@@ -120,8 +120,8 @@ class InfthorArm(StepBenchmark):
             "success": view.success,
             "reward": view.reward,
             "distance": view.distance,
+            "ended": str(view.ended or "stopped"),
         }
-        result["ended"] = str(view.ended or "stopped")
         return StepResult(view, view.reward, view.ended is not None, result)
 
     def make_obs(self, raw_obs: ArmView, task: dict[str, Any]) -> dict[str, Any]:

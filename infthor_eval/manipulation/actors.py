@@ -5,13 +5,14 @@ how `planner-arm` moves is in `planner/steps.py`.
 """
 
 import random
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar, Protocol, runtime_checkable
+from itertools import islice
+from typing import Protocol, runtime_checkable
 
 from infthor_eval.formats.pictures.blank import blank_like
 from infthor_eval.manipulation.conversion import Call
-from infthor_eval.manipulation.environment import ArmEnvironment
+from infthor_eval.manipulation.environment import ArmEnvironment, Step
 from infthor_eval.manipulation.kinds import ManipulationKind
 from infthor_eval.manipulation.planner.steps import plan_steps
 from infthor_eval.runs import StoredRequest
@@ -28,7 +29,6 @@ from model_adapters import (
 )
 from model_adapters.refusals import check_chunk
 
-Step = ArmDelta | Sequence[Call]
 _IN_FLIGHT = 2  # trajectories at a time; each has two simulators
 _MAX_TURN = 0.17  # radians of a random turn about each axis: 10 degrees
 
@@ -117,76 +117,76 @@ class PolicyActor:
         return replace(seen, image=blank_like(seen.image), wrist=wrist)
 
 
-class _ArmBaseline(BaselineSubject):
-    capabilities = Capabilities(counts_tokens=False, token_ids=False, max_in_flight=_IN_FLIGHT)
-    _actor: ClassVar[type[ArmActor]]
-
-    def arm_actor(self) -> ArmActor:
-        """See `ArmBaseline`."""
-        return self._actor()
-
-
 class _BaselineActor:
+    """Takes the steps that a baseline yields, one at a time."""
+
+    def __init__(self, steps: Callable[[ArmSituation], Iterator[Step]]) -> None:
+        self._steps_of = steps
+
+    def begin(self, situation: ArmSituation) -> None:
+        self._steps = self._steps_of(situation)
+
+    def act(self, seen: ArmObservation | None) -> Sequence[Step]:
+        return [*islice(self._steps, 1)]
+
     def end(self, *, success: bool | None) -> None:
         """Do nothing."""
 
 
-class _StillActor(_BaselineActor):
-    def begin(self, situation: ArmSituation) -> None:
-        environment = situation.environment
-        is_pickup = environment.episode.kind == ManipulationKind.PICKUP
-        take: Call = {"action": "PickupObject"}
-        if not environment.takes_all:
-            take["objectIdCandidates"] = [environment.start.object_id]
-        self._left: list[Step] = [[take if is_pickup else {"action": "ReleaseObject"}]]
+class _ArmBaseline(BaselineSubject):
+    capabilities = Capabilities(counts_tokens=False, token_ids=False, max_in_flight=_IN_FLIGHT)
 
-    def act(self, seen: ArmObservation | None) -> Sequence[Step]:
-        return [self._left.pop()] if self._left else []
+    def arm_actor(self) -> ArmActor:
+        """See `ArmBaseline`."""
+        return _BaselineActor(self._steps)
 
-
-class _RandomArmActor(_BaselineActor):
-    def begin(self, situation: ArmSituation) -> None:
-        self._random = random.Random(situation.seed)
-        self._max_step = situation.max_step
-
-    def act(self, seen: ArmObservation | None) -> Sequence[Step]:
-        translation = self._random_vector(self._max_step)
-        rotation = self._random_vector(_MAX_TURN)
-        return [ArmDelta(translation, rotation, self._random.random())]
-
-    def _random_vector(self, most: float) -> tuple[float, float, float]:
-        uniform = self._random.uniform
-        return uniform(-most, most), uniform(-most, most), uniform(-most, most)
-
-
-class _PlannerActor(_BaselineActor):
-    def begin(self, situation: ArmSituation) -> None:
-        self._steps = plan_steps(situation.environment)
-
-    def act(self, seen: ArmObservation | None) -> Sequence[Step]:
-        step = next(self._steps, None)
-        return [] if step is None else [step]
+    @staticmethod
+    def _steps(situation: ArmSituation) -> Iterator[Step]:
+        """Yield the steps of an episode; it gives up where they end."""
+        raise NotImplementedError
 
 
 class StillArm(_ArmBaseline):
     """Closes its hand, or opens it, where it is: what succeeds without a movement."""
 
     name = "still"
-    _actor = _StillActor
+
+    @staticmethod
+    def _steps(situation: ArmSituation) -> Iterator[Step]:
+        environment = situation.environment
+        take: Call = {"action": "PickupObject"}
+        if not environment.takes_all:
+            take["objectIdCandidates"] = [environment.start.object_id]
+        is_pickup = environment.episode.kind == ManipulationKind.PICKUP
+        yield [take if is_pickup else {"action": "ReleaseObject"}]
 
 
 class RandomArm(_ArmBaseline):
     """Moves, turns, closes and opens its hand at random."""
 
     name = "random-arm"
-    _actor = _RandomArmActor
+
+    @staticmethod
+    def _steps(situation: ArmSituation) -> Iterator[Step]:
+        draw = random.Random(situation.seed)
+        while True:
+            translation = _random_vector(draw, situation.max_step)
+            rotation = _random_vector(draw, _MAX_TURN)
+            yield ArmDelta(translation, rotation, draw.random())
+
+
+def _random_vector(draw: random.Random, most: float) -> tuple[float, float, float]:
+    return draw.uniform(-most, most), draw.uniform(-most, most), draw.uniform(-most, most)
 
 
 class PlannerArm(_ArmBaseline):
     """Knows where everything is, and moves there by inverse kinematics: the upper bound."""
 
     name = "planner-arm"
-    _actor = _PlannerActor
+
+    @staticmethod
+    def _steps(situation: ArmSituation) -> Iterator[Step]:
+        return plan_steps(situation.environment)
 
 
 BASELINES: Mapping[str, Callable[[int], ArmBaseline]] = {

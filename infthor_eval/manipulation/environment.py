@@ -5,8 +5,8 @@ simulator is in `infthor_eval/thor/transfer.py`.
 """
 
 import math
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 from infthor_eval.episodes.records import InfeasibleError
@@ -41,6 +41,7 @@ from infthor_eval.thor.view import (
 )
 from model_adapters import ArmDelta, ArmObservation
 
+Step = ArmDelta | Sequence[Call]  # of a policy, or calls of AI2-THOR's
 SUCCESS_RULES = 1  # part of a run's identity: another number when the code gives other successes
 _MAX_WAITS = 20  # until a released object lies still
 _HALVINGS = 8  # of the range of heights, to half a centimetre
@@ -173,7 +174,7 @@ class ArmEnvironment:
         self._n_steps = 0
         return self._outcome()
 
-    def step(self, action: ArmDelta | Sequence[Call]) -> ArmOutcome:
+    def step(self, action: Step) -> ArmOutcome:
         """Execute one step.
 
         Args:
@@ -185,18 +186,30 @@ class ArmEnvironment:
         """
         if self._is_over:
             raise RuntimeError("no episode is under way; reset the environment to one")
-        movements = self._conversion.calls(action) if isinstance(action, ArmDelta) else list(action)
-        calls, refusals = self._run(movements)
+        calls = self._conversion.calls(action) if isinstance(action, ArmDelta) else list(action)
+        refusals = self._run(calls)
         if isinstance(action, ArmDelta):
             # After the movement, as the sphere holds other objects then.
-            gripper_calls, gripper_refusals = self._run(self._gripper(action))
-            calls = [*calls, *gripper_calls]
-            refusals = [*refusals, *gripper_refusals]
+            gripper_calls = self._gripper(action)
+            refusals += self._run(gripper_calls)
+            calls += gripper_calls
         released = any(call["action"] == "ReleaseObject" for call in calls)
         ended = self._ending(released)
         self._is_over = ended is not None
         self._n_steps += 1
         return self._outcome(tuple(calls), tuple(refusals), ended)
+
+    def step_within(self, action: Step, max_steps: int) -> Iterator[tuple[Step, ArmOutcome]]:
+        """Execute one step of an episode of so many steps at most, and yield it with its outcome;
+        after the last one a policy's hand closes, if it is to close at the end."""
+        outcome = self.step(action)
+        if outcome.ended is None and self._n_steps >= max_steps:
+            if isinstance(action, ArmDelta) and self._closes_at_the_end:
+                yield action, outcome
+                action = self.closing_calls()
+                outcome = self.step(action)
+            outcome = replace(outcome, ended=outcome.ended or ArmEnded.LIMIT)
+        yield action, outcome
 
     def _outcome(
         self,
@@ -218,15 +231,10 @@ class ArmEnvironment:
         answer = self._simulator.query(action, **arguments)
         return answer.result if answer.success else None
 
-    def _run(self, calls: Iterable[Call]) -> tuple[list[Call], list[str]]:
-        done = []
-        refusals = []
-        for call in calls:
-            view = self._simulator.step(**call)
-            done.append(call)
-            if not view.success:
-                refusals.append(view.error or "refused without a message")
-        return done, refusals
+    def _run(self, calls: Iterable[Call]) -> list[str]:
+        """Execute calls; return the messages on those that are refused."""
+        views = [self._simulator.step(**call) for call in calls]
+        return [view.error or "refused without a message" for view in views if not view.success]
 
     def _gripper(self, delta: ArmDelta) -> list[Call]:
         """Return the calls of the gripper: it closes around something, or releases what it has."""
@@ -239,7 +247,7 @@ class ArmEnvironment:
         return self.closing_calls()
 
     @property
-    def closes_at_the_end(self) -> bool:
+    def _closes_at_the_end(self) -> bool:
         """Whether a policy's hand closes once, after its last step."""
         return self.episode.kind == ManipulationKind.PICKUP and self._grasp.closing is Closing.END
 

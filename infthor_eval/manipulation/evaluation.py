@@ -13,9 +13,9 @@ from infthor_eval.episodes.simulators import Simulators
 from infthor_eval.errors import SceneError, UsageError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.trajectory import Trajectory
-from infthor_eval.manipulation.actors import ArmActor, ArmBaseline, ArmSituation, PolicyActor, Step
+from infthor_eval.manipulation.actors import ArmActor, ArmBaseline, ArmSituation, PolicyActor
 from infthor_eval.manipulation.config import ManipulationConfig
-from infthor_eval.manipulation.environment import ArmEnvironment, ArmOutcome, arm_of
+from infthor_eval.manipulation.environment import ArmEnvironment, ArmOutcome, Step, arm_of
 from infthor_eval.manipulation.expert import ExpertStates, replay_expert
 from infthor_eval.manipulation.kinds import PutCriterion, Senses
 from infthor_eval.manipulation.options import ManipulationOptions
@@ -248,25 +248,18 @@ class ArmRunner(EpisodeRunner[ArmEnvironment, ArmRecord]):
         return EpisodeResult(msgspec.structs.replace(record, reward=reward))
 
     def _act(
-        self, environment: ArmEnvironment, outcome: ArmOutcome, max_steps: int
+        self, environment: ArmEnvironment, begun: ArmOutcome, max_steps: int
     ) -> tuple[list[ArmStep], ArmEnded]:
         """Let the actor act until the episode is over, chunk by chunk of steps."""
         steps: list[ArmStep] = []
         chunk: list[Step] = []
-        step: Step = ()
+        outcome = begun
         while outcome.ended is None:
-            if len(steps) >= max_steps:
-                if isinstance(step, ArmDelta) and environment.closes_at_the_end:
-                    closing = environment.closing_calls()
-                    outcome = environment.step(closing)
-                    steps.append(_arm_step(closing, outcome))
-                return steps, outcome.ended or ArmEnded.LIMIT
             chunk = chunk or list(self._actor.act(outcome.observation))
             if not chunk:
                 return steps, ArmEnded.GAVE_UP
-            step = chunk.pop(0)
-            outcome = environment.step(step)
-            steps.append(_arm_step(step, outcome))
+            for step, outcome in environment.step_within(chunk.pop(0), max_steps):
+                steps.append(_arm_step(step, outcome))
         return steps, outcome.ended
 
 

@@ -91,7 +91,13 @@ class ManipulationSuite:
 
     def tables(self, runs: Sequence[RunSummary]) -> list[Table]:
         """See `Suite.tables`."""
-        return _result_tables(runs)
+        tasks = list(named_tasks(runs))
+        return [
+            _success_table(runs),
+            _episodes_table(tasks),
+            *_choices_tables(tasks),
+            endings_table("How episodes ended", tasks),
+        ]
 
 
 def _overview_table(runs: Sequence[RunSummary]) -> Table:
@@ -100,17 +106,6 @@ def _overview_table(runs: Sequence[RunSummary]) -> Table:
     rows = tuple(Row(row.cells[:_N_OVERVIEW]) for row in full.rows if not row.is_published)
     title = "Low-level manipulation, success %, 95 % interval in brackets"
     return Table(title, full.columns[:_N_OVERVIEW], rows, full.notes)
-
-
-def _result_tables(runs: Sequence[RunSummary]) -> list[Table]:
-    """Return all tables of some runs."""
-    tasks = list(named_tasks(runs))
-    return [
-        _success_table(runs),
-        _episodes_table(tasks),
-        *_choices_tables(tasks),
-        endings_table("How episodes ended", tasks),
-    ]
 
 
 def _success_table(runs: Sequence[RunSummary]) -> Table:

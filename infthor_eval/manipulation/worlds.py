@@ -3,9 +3,9 @@
 To add a harness that drives our arms: a module in `infthor_eval/harness/` around `ArmWorld`.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import msgspec
@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from infthor_eval.episodes.records import InfeasibleError
 from infthor_eval.episodes.retries import with_retries
 from infthor_eval.errors import DataError, SceneError, SimulatorError, UsageError
-from infthor_eval.manipulation.conversion import Call
-from infthor_eval.manipulation.environment import ArmEnvironment, ArmOutcome, arm_of
+from infthor_eval.manipulation.environment import ArmEnvironment, ArmOutcome, Step, arm_of
 from infthor_eval.manipulation.evaluation import ArmUnit, Camera, ManipulationEvaluation
 from infthor_eval.manipulation.expert import replay_expert
 from infthor_eval.manipulation.options import ManipulationOptions
@@ -25,7 +24,7 @@ from infthor_eval.manipulation.senses import WRIST, hand_state
 from infthor_eval.manipulation.suite import ManipulationSuite
 from infthor_eval.runs import Catalog, TaskRequest
 from infthor_eval.thor.frames import NoFrames
-from model_adapters import ArmDelta, HandState
+from model_adapters import HandState
 
 
 @dataclass(frozen=True)
@@ -124,7 +123,6 @@ class ArmWorld:
         """
         self._unit = self.units[name]
         self._settings = self.settings[self._unit.key.task]
-        self._n_steps = 0
         try:
             self._enter(self._unit)
             outcome, _ = with_retries(self._simulator, self._begin, self._drop_environment)
@@ -132,7 +130,7 @@ class ArmWorld:
             raise InfeasibleError(str(error)) from error
         return self._view(outcome)
 
-    def step(self, action: ArmDelta | Sequence[Call]) -> ArmView:
+    def step(self, action: Step) -> ArmView:
         """Execute a step of a policy, or calls of AI2-THOR's; the last that the task allows ends
         the episode.
 
@@ -141,13 +139,8 @@ class ArmWorld:
             SimulatorError: the simulator fails, and with it the episode.
         """
         environment = self.environment
-        self._n_steps += 1
         try:
-            outcome = environment.step(action)
-            if outcome.ended is None and self._n_steps >= self._settings.max_steps:
-                if isinstance(action, ArmDelta) and environment.closes_at_the_end:
-                    outcome = environment.step(environment.closing_calls())
-                outcome = replace(outcome, ended=outcome.ended or ArmEnded.LIMIT)
+            *_, (_, outcome) = environment.step_within(action, self._settings.max_steps)
         except SimulatorError:
             self._drop_environment()
             raise

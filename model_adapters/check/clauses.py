@@ -1,6 +1,6 @@
 """What the checks share: clauses, their error, and the questions that are asked."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, Generic, Protocol
 
@@ -43,6 +43,13 @@ def raises(
     except error_type:
         return True
     return False
+
+
+def require_error(
+    clause: str, error_type: type[Exception], call: Callable[..., Any], *args: Any, **kwargs: Any
+) -> None:
+    """Raise `ContractError` with the clause unless a call raises an error of this type."""
+    require(raises(error_type, call, *args, **kwargs), clause)
 
 
 def check_members(adapter: Any) -> None:
@@ -113,3 +120,12 @@ def ask(model: Model, *parts: Part, decoding: Decoding = GREEDY) -> Reply:
 def same_reply(one: Reply, other: Reply) -> bool:
     """Return whether text and token ids of two replies are equal."""
     return (one.text, one.token_ids) == (other.text, other.token_ids)
+
+
+def require_same(
+    model: Model, replies: Sequence[Reply], others: Iterable[Reply], clause: str
+) -> None:
+    """Raise `ContractError` with the clause unless replies equal others in order, which are asked
+    for only if the model is deterministic."""
+    if model.capabilities.deterministic:
+        require(all(map(same_reply, replies, others)), clause)

@@ -21,8 +21,9 @@ from model_adapters.check.clauses import (
     check_identity,
     check_members,
     frames_of_one_colour,
-    raises,
     require,
+    require_error,
+    require_same,
     same_reply,
     start_conversation,
 )
@@ -121,21 +122,16 @@ def _check_sampling(model: Model, frame: Part) -> None:
     ]
     talk = start_conversation(model, frame, "\nDescribe the picture.")
     if not model.capabilities.sampling:
-        refuses = raises(ModelError, talk.reply, decodings[0])
-        require(
-            refuses,
-            "a temperature does not raise ModelError though sampling is false; call check_decoding "
-            "first",
-        )
+        clause = "a temperature does not raise ModelError though sampling is false"
+        require_error(f"{clause}; call check_decoding first", ModelError, talk.reply, decodings[0])
         return
     replies = [talk.reply(decoding) for decoding in decodings]
     require(
         any(not same_reply(replies[0], other) for other in replies),
         "no seed changes a reply at temperature 2",
     )
-    if model.capabilities.deterministic:
-        again = [talk.reply(decoding) for decoding in reversed(decodings)][::-1]
-        require(all(map(same_reply, replies, again)), "the same seed does not give the same reply")
+    again = map(talk.reply, reversed(decodings))
+    require_same(model, replies[::-1], again, "the same seed does not give the same reply")
 
 
 def _check_choices(model: Model, frame: Part) -> None:
@@ -143,11 +139,8 @@ def _check_choices(model: Model, frame: Part) -> None:
     decoding = Decoding(max_new_tokens=64, choices=_CHOICES)
     talk = start_conversation(model, frame, QUESTION)
     if not model.capabilities.choices:
-        refuses = raises(ModelError, talk.reply, decoding)
-        require(
-            refuses,
-            "choices do not raise ModelError though choices is false; call check_decoding first",
-        )
+        clause = "choices do not raise ModelError though choices is false"
+        require_error(f"{clause}; call check_decoding first", ModelError, talk.reply, decoding)
         return
     for choices in (_CHOICES, _CHOICES[1:], _CHOICES[:1]):
         text = talk.reply(Decoding(max_new_tokens=64, choices=choices)).text
@@ -162,11 +155,9 @@ def _check_video(model: Model, black: FrameRef, white: FrameRef) -> None:
         Video((black, white, white, white), fps=1.0),
     ]
     if not model.capabilities.video_input:
-        refuses = raises(ModelError, start_conversation(model, videos[0], QUESTION).reply, GREEDY)
-        require(
-            refuses,
-            "a video does not raise ModelError though video_input is false; call check_turns first",
-        )
+        clause = "a video does not raise ModelError though video_input is false"
+        talk = start_conversation(model, videos[0], QUESTION)
+        require_error(f"{clause}; call check_turns first", ModelError, talk.reply, GREEDY)
         return
     talks = [start_conversation(model, video, QUESTION) for video in videos]
     if model.capabilities.counts_tokens:
@@ -174,12 +165,8 @@ def _check_video(model: Model, black: FrameRef, white: FrameRef) -> None:
         within = talks[0].n_tokens or 0
         require(within > without, "n_tokens does not grow with a video")
     replies = [talk.reply(GREEDY) for talk in talks]
-    if model.capabilities.deterministic:
-        again = [talk.reply(GREEDY) for talk in reversed(talks)][::-1]
-        require(
-            all(map(same_reply, replies, again)),
-            "a reply to a video depends on the videos before it",
-        )
+    again = (talk.reply(GREEDY) for talk in reversed(talks))
+    require_same(model, replies[::-1], again, "a reply to a video depends on the videos before it")
 
 
 def _check_flight(model: Model, black: Part, white: Part) -> None:
@@ -198,10 +185,8 @@ def _check_flight(model: Model, black: Part, white: Part) -> None:
 
     with ThreadPoolExecutor(n_threads) as pool:
         together = list(pool.map(answer, questions))
-    alike = not model.capabilities.deterministic or all(
-        map(same_reply, together, map(answer, questions))
-    )
-    require(alike, "replies to questions asked at the same time differ from those asked one by one")
+    clause = "replies to questions asked at the same time differ from those asked one by one"
+    require_same(model, together, map(answer, questions), clause)
 
 
 def _check_parts(model: Model, frame: Part) -> None:
@@ -212,14 +197,10 @@ def _check_parts(model: Model, frame: Part) -> None:
         _alike(model, split, whole),
         "a text appended in two pieces differs from the same text in one",
     )
-    require(
-        raises(TypeError, split.append, 3),
-        "append() of neither text nor frame does not raise TypeError",
-    )
-    require(
-        raises(ValueError, split.append, "x", role="narrator"),
-        "append() in an unknown role does not raise",
-    )
+    clause = "append() of neither text nor frame does not raise TypeError"
+    require_error(clause, TypeError, split.append, 3)
+    clause = "append() in an unknown role does not raise"
+    require_error(clause, ValueError, split.append, "x", role="narrator")
     require(_alike(model, split, whole), "a refused append() changes the conversation")
 
 
@@ -276,22 +257,18 @@ def _check_marks(model: Model, frame: Part) -> None:
     require(_alike(model, talk, unchanged), "rewind() does not bring back n_tokens or the reply")
     talk.append("Yes.", role="assistant")
     talk.append(" More and more.")
-    require(
-        raises(ValueError, talk.rewind, late),
-        "rewind() to a mark behind the point rewound to does not raise",
-    )
+    clause = "rewind() to a mark behind the point rewound to does not raise"
+    require_error(clause, ValueError, talk.rewind, late)
     talk.rewind(early)
     require(_alike(model, talk, unchanged), "a second rewind() to the same mark fails")
     foreign = start_conversation(model, frame).mark()
-    require(
-        raises(ValueError, talk.rewind, foreign),
-        "rewind() to another conversation's mark does not raise",
-    )
+    clause = "rewind() to another conversation's mark does not raise"
+    require_error(clause, ValueError, talk.rewind, foreign)
 
 
 def _check_nothing_to_reply_to(talk: Conversation, what: str) -> None:
-    refuses = raises(ModelError, talk.reply, GREEDY)
-    require(refuses, f"reply() to {what} does not raise ModelError; call check_turns first")
+    clause = f"reply() to {what} does not raise ModelError; call check_turns first"
+    require_error(clause, ModelError, talk.reply, GREEDY)
 
 
 def _check_system(model: Model, frame: Part) -> None:
@@ -396,11 +373,9 @@ def _check_reply(model: Model, frame: Part) -> None:
 def _check_frames(model: Model, black: FrameRef, white: FrameRef) -> None:
     """Check that the model sees the frames, or refuses them if it reads text alone."""
     if not model.capabilities.image_input:
-        refuses = raises(ModelError, start_conversation(model, black, QUESTION).reply, GREEDY)
-        require(
-            refuses,
-            "a frame does not raise ModelError though image_input is false; call check_turns first",
-        )
+        clause = "a frame does not raise ModelError though image_input is false"
+        talk = start_conversation(model, black, QUESTION)
+        require_error(f"{clause}; call check_turns first", ModelError, talk.reply, GREEDY)
         return
     # Equal replies to one question may be chance, so one of several replies has to differ.
     questions = [
@@ -428,8 +403,8 @@ def _check_sharing(model: Model, black: Part, white: Part) -> None:
         talk.rewind(start)
     ask(model, white, "\nSomething else.")  # evicts whatever the back end has cached
     fresh = ask(model, black, white, "\nWhat colour was the first frame?")
-    alike = same_reply(shared[1], fresh) or not model.capabilities.deterministic
-    require(alike, "a reply after a rewind differs from that of a new conversation")
+    clause = "a reply after a rewind differs from that of a new conversation"
+    require_same(model, shared[1:], [fresh], clause)
 
 
 def _check_continuations(model: Model, black: Part, white: Part) -> None:
@@ -447,8 +422,7 @@ def _check_continuations(model: Model, black: Part, white: Part) -> None:
         len(together) == len(continuations), "replies() does not give one reply per continuation"
     )
     alone = [ask(model, black, *parts) for parts in continuations]
-    alike = all(map(same_reply, together, alone)) or not model.capabilities.deterministic
-    require(alike, "replies() differs from asking one by one")
+    require_same(model, together, alone, "replies() differs from asking one by one")
     require(talk.replies([], GREEDY) == [], "replies() to no continuations is not an empty list")
 
 

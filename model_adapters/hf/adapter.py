@@ -1,7 +1,7 @@
 """Base of the adapters of model families, whose classes have nothing but settings."""
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from typing import Any, ClassVar, TypeVar
 
 import torch
@@ -76,15 +76,12 @@ def load_model(
     return TransformersModel(name, loaded, located.options)
 
 
-@contextmanager
-def wrap_mismatch_errors(pretrained: str) -> Iterator[None]:
+def wrap_mismatch_errors(pretrained: str) -> AbstractContextManager[None]:
     """Turn errors of a model on the pixels or tokens of another checkpoint's processor into one
     line.
     """
     # Any error is possible: the processor's settings come from a file and end up in arithmetic and
     # shapes.
     problem = f"{pretrained}: the model fails on what the processor makes of a frame"
-    with wrap_errors(
-        problem, "do they belong to one checkpoint?", catch=Exception, raise_as=ModelError
-    ):
-        yield
+    hint = "do they belong to one checkpoint?"
+    return wrap_errors(problem, hint, catch=Exception, raise_as=ModelError)

@@ -130,7 +130,5 @@ class HfModel(CheckpointModel):
     @property
     def _context_limit(self) -> int | None:
         """Context limit of the options, else of the checkpoint, or None."""
-        options = self._options
-        return (
-            self._loaded.max_tokens if options.max_tokens is None else options.max_tokens
-        ) or None
+        chosen = self._options.max_tokens
+        return (self._loaded.max_tokens if chosen is None else chosen) or None

@@ -2,7 +2,7 @@
 
 import traceback
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 
 import torch
 
@@ -27,17 +27,12 @@ def check_limit(
         )
 
 
-@contextmanager
-def wrap_model_errors(name: str) -> Iterator[None]:
+def wrap_model_errors(name: str) -> AbstractContextManager[None]:
     """Turn a model's or its processor's error on a request into one line, so that the run goes
     on."""
-    with wrap_errors(
-        f"{name} fails on the request",
-        "change the request, or report it",
-        catch=_FAILURES,
-        raise_as=ModelError,
-    ):
-        yield
+    problem = f"{name} fails on the request"
+    hint = "change the request, or report it"
+    return wrap_errors(problem, hint, catch=_FAILURES, raise_as=ModelError)
 
 
 @contextmanager

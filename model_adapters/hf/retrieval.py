@@ -52,10 +52,8 @@ class Retriever:
             raise UsageError(str(error)) from error
         self._model: Any = model.to(resolve_device(Placement())).eval()
         self._origin = origin(folder, commit, name)
-        file = (
-            user_cache("clip_vectors")
-            / f"{digest(json.dumps(self.identity(), sort_keys=True))}.f32"
-        )
+        key = digest(json.dumps(self.identity(), sort_keys=True))
+        file = user_cache("clip_vectors") / f"{key}.f32"
         self._vectors = VectorFile(file, model.config.projection_dim)
 
     def identity(self) -> dict[str, Any]:

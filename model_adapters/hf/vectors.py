@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from infthor_eval.errors import DataError
+from infthor_eval.errors import wrap_errors
 
 _DIGITS = 6  # digits of a similarity; rounding errors beyond must not decide between equal vectors
 
@@ -21,13 +21,9 @@ class VectorFile:
         self._row_type = np.dtype([("key", "S32"), ("vector", "<f4", (width,))])
         self._rows: dict[str, int] = {}
         self._n_rows = 0
-        try:
+        with wrap_errors(f"{path}: cannot be written", "set XDG_CACHE_HOME"):
             path.parent.mkdir(parents=True, exist_ok=True)
             self._file = path.open("a+b")
-        except OSError as error:
-            raise DataError(
-                f"{path}: cannot be written ({error.strerror}); set XDG_CACHE_HOME"
-            ) from error
         self._read_new_keys()
 
     def __contains__(self, key: str) -> bool:
@@ -46,15 +42,12 @@ class VectorFile:
         rows["vector"] = vectors
         fcntl.flock(self._file, fcntl.LOCK_EX)
         try:
-            size = os.fstat(self._file.fileno()).st_size
-            # Drops a killed process's unfinished row.
-            self._file.truncate(size - size % self._row_type.itemsize)
-            self._file.write(rows.tobytes())
-            self._file.flush()
-        except OSError as error:
-            raise DataError(
-                f"{self._file.name}: cannot be written ({error.strerror}); free some space"
-            ) from error
+            with wrap_errors(f"{self._file.name}: cannot be written", "free some space"):
+                size = os.fstat(self._file.fileno()).st_size
+                # Drops a killed process's unfinished row.
+                self._file.truncate(size - size % self._row_type.itemsize)
+                self._file.write(rows.tobytes())
+                self._file.flush()
         finally:
             fcntl.flock(self._file, fcntl.LOCK_UN)
         self._read_new_keys()

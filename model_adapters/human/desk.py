@@ -80,45 +80,27 @@ class Question:
 
 
 class Desk:
-    """One question at a time. Each change has a number, so that a page can wait for the next."""
+    """One question at a time. Each change has a number, so that a page can wait for the next.
+
+    Attributes:
+        question: what is asked now; None between two questions.
+        version: number of changes so far.
+        n_answered: number of questions whose answers the run has kept so far.
+        is_stopped: whether the person has stopped the run.
+        is_closed: whether nothing will be asked any more.
+    """
 
     def __init__(self) -> None:
+        self.question: Question | None = None
+        self.version = self.n_answered = 0
+        self.is_closed = self.is_stopped = False
         self._changed = threading.Condition()
         self._numbers = itertools.count(1)
-        self._question: Question | None = None
         self._answer: Answer | None = None
-        self._version = 0
         self._has_readers = False
         self._n_reading = 0  # pages that wait for a change
         self._is_informed = self._is_awaited = False
-        self._n_kept = 0
         self._in_hand: int | None = None  # number of an answer that may not be on disk yet
-        self._is_closed = self._is_stopped = False
-
-    @property
-    def question(self) -> Question | None:
-        """What is asked now; None between two questions."""
-        return self._question
-
-    @property
-    def version(self) -> int:
-        """Number of changes so far."""
-        return self._version
-
-    @property
-    def n_answered(self) -> int:
-        """Number of questions whose answers the run has kept so far."""
-        return self._n_kept
-
-    @property
-    def is_stopped(self) -> bool:
-        """Whether the person has stopped the run."""
-        return self._is_stopped
-
-    @property
-    def is_closed(self) -> bool:
-        """Whether nothing will be asked any more."""
-        return self._is_closed
 
     def ask(self, inquiry: Inquiry) -> Answer:
         """Put a question, and wait until it is answered.
@@ -132,18 +114,18 @@ class Desk:
         with self._changed:
             self._settle(is_kept=True)
             number = next(self._numbers)
-            self._question = Question(number, inquiry)
+            self.question = Question(number, inquiry)
             self._answer = None
             self._change()
             try:
-                while self._answer is None and not self._is_stopped:
+                while self._answer is None and not self.is_stopped:
                     self._changed.wait(_WAKE_S)
                 if self._answer is None:
                     raise KeyboardInterrupt
                 self._in_hand = number
                 return self._answer
             finally:
-                self._question = None
+                self.question = None
                 self._change()
 
     def give(self, number: int, text: str, n_watched: int) -> None:
@@ -153,13 +135,9 @@ class Desk:
             StaleError: it is not the one that is asked.
         """
         with self._changed:
-            if (
-                self._question is None
-                or self._question.number != number
-                or self._answer is not None
-            ):
+            if self.question is None or self.question.number != number or self._answer is not None:
                 raise StaleError
-            self._answer = Answer(text, n_watched, self._question.clock.seconds)
+            self._answer = Answer(text, n_watched, self.question.clock.seconds)
             self._changed.notify_all()
 
     def report_screen(self, number: int, page: str, *, shows: bool) -> None:
@@ -168,15 +146,15 @@ class Desk:
         Reports on earlier questions are ignored.
         """
         with self._changed:
-            if self._question is not None and self._question.number == number:
-                clock = self._question.clock
+            if self.question is not None and self.question.number == number:
+                clock = self.question.clock
                 (clock.show if shows else clock.hide)(page)
 
     def wait_until_kept(self, number: int) -> bool:
         """Wait until the answer to a question is kept; False if the run has ended before."""
         with self._changed:
-            self._changed.wait_for(lambda: self._n_kept >= number or self._is_closed)
-            return self._n_kept >= number
+            self._changed.wait_for(lambda: self.n_answered >= number or self.is_closed)
+            return self.n_answered >= number
 
     @contextmanager
     def reading(self) -> Iterator[None]:
@@ -211,22 +189,22 @@ class Desk:
         """Let the run end as Ctrl-C does: what is asked now stays unanswered, and is asked when the
         run goes on."""
         with self._changed:
-            self._is_stopped = True
+            self.is_stopped = True
             self._change()
 
     def close(self, *, is_kept: bool = True) -> None:
         """Say that nothing will be asked any more, and whether the last answer is on disk."""
         with self._changed:
             self._settle(is_kept=is_kept)
-            self._is_closed = True
+            self.is_closed = True
             self._is_awaited = self._n_reading > 0
             self._change()
 
     def _settle(self, *, is_kept: bool) -> None:
         if self._in_hand is not None and is_kept:
-            self._n_kept = self._in_hand
+            self.n_answered = self._in_hand
         self._in_hand = None
 
     def _change(self) -> None:
-        self._version += 1
+        self.version += 1
         self._changed.notify_all()

@@ -6,12 +6,11 @@ from contextlib import ExitStack
 from socket import socket
 from typing import Any
 
-from infthor_eval.formats.frames import FrameRef
-from model_adapters.backend import BackendConversation
+from model_adapters.backend import UncountedBackend
 from model_adapters.human.adapter import HumanOptions
 from model_adapters.human.desk import Desk, Inquiry
 from model_adapters.human.serving import serve_desk
-from model_adapters.protocols import Capabilities, Conversation, Decoding, Notice, Reply, Turn
+from model_adapters.protocols import Capabilities, Decoding, Notice, Reply, Turn
 from model_adapters.thinking import cut_at_stop
 
 UNTIMED = (
@@ -20,7 +19,7 @@ UNTIMED = (
 )
 
 
-class HumanModel:
+class HumanModel(UncountedBackend):
     """A person, who answers on a page of this machine; the page opens with the first request."""
 
     def __init__(self, name: str, options: HumanOptions, listening: socket) -> None:
@@ -46,16 +45,6 @@ class HumanModel:
         """Return who answers, as JSON values."""
         return {"adapter": self.name, "reader": str(self._options.reader)}
 
-    def tokens_per_frame(self, frame: FrameRef) -> None:
-        """Return None: people count no tokens."""
-
-    def conversation(self) -> Conversation:
-        """Return a new, empty conversation."""
-        return BackendConversation(self)
-
-    def count(self, turns: Sequence[Turn]) -> None:
-        """Return None, as `tokens_per_frame`."""
-
     def show_notice(self, notice: Notice) -> None:
         """See `PersonModel`."""
         self._notice = notice
@@ -75,12 +64,6 @@ class HumanModel:
             seconds=answer.seconds,
             faults=() if answer.seconds is not None else (UNTIMED,),
         )
-
-    def answer_each(
-        self, conversations: Sequence[Sequence[Turn]], decoding: Decoding
-    ) -> list[Reply]:
-        """Ask one after the other; see `Conversation.replies`."""
-        return [self.answer(turns, decoding) for turns in conversations]
 
     def close(self) -> None:
         """Tell the page that it is over, and close it."""

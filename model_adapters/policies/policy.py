@@ -96,16 +96,15 @@ class VlaPolicy:
         """Return checkpoint, dataset of the statistics, precision, versions and use of chunks, as
         JSON values."""
         options = self._options
-        return (
-            self._identity
-            | {
-                "adapter": self.name,
-                "constrained": options.constrained,
-                "ensemble": options.ensemble,
-                "execute": options.execute,
-            }
-            | ({} if self._crop is None else {"center_crop": True})
-        )
+        cropped = {} if self._crop is None else {"center_crop": True}
+        return {
+            **self._identity,
+            "adapter": self.name,
+            "constrained": options.constrained,
+            "ensemble": options.ensemble,
+            "execute": options.execute,
+            **cropped,
+        }
 
     def reset(self) -> None:
         """Drop the chunks of the last episode."""

@@ -5,10 +5,9 @@ the expected keys are derived from the module, and a key that is missing, unknow
 shape is an error: a part that silently stayed random would spoil all results.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import torch
@@ -17,21 +16,21 @@ from safetensors import safe_open
 from torch import nn
 
 from infthor_eval.errors import ModelError
+from model_adapters.policies.checkpoint import PolicyCheckpoint
 
 Shape = tuple[int, ...]
 
 _MOST_KEYS = 3  # keys that an error lists
 
 
-@contextmanager
-def empty_parameters() -> Iterator[None]:
+def empty_parameters() -> AbstractContextManager[None]:
     """Create modules whose parameters take no memory, but whose buffers are real.
 
     Buffers are computed when a module is created and are not in a checkpoint; on the meta device
     they would be lost.
     """
-    with init_empty_weights(include_buffers=False):
-        yield
+    created: AbstractContextManager[None] = init_empty_weights(include_buffers=False)
+    return created
 
 
 @dataclass(frozen=True)
@@ -97,10 +96,8 @@ class Layout:
 
 def load_weights(
     module: nn.Module,
-    folder: Path,
+    checkpoint: PolicyCheckpoint,
     layout: Layout,
-    *,
-    pretrained: str,
     device: torch.device,
     dtype: torch.dtype,
 ) -> None:
@@ -109,13 +106,13 @@ def load_weights(
     Args:
         module: a module created within `empty_parameters()`. It ends up on the device; buffers keep
             their types.
-        folder: folder of the files.
+        checkpoint: the checkpoint.
         layout: expected keys.
-        pretrained: name of the checkpoint, for messages.
         device: device of the parameters.
         dtype: type of the parameters.
     """
-    paths = sorted(folder.glob("*.safetensors"))
+    pretrained = checkpoint.pretrained
+    paths = sorted(checkpoint.folder.glob("*.safetensors"))
     if not paths:
         raise ModelError(
             f"{pretrained} has no *.safetensors file; give a checkpoint with weights in that format"

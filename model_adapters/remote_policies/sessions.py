@@ -1,11 +1,11 @@
 """A policy behind a server of websockets: a session for each thread that acts."""
 
 import importlib
-import threading
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import asdict
+from threading import get_ident
 from typing import Any, ClassVar, Self
 from urllib.parse import urlsplit
 
@@ -151,10 +151,6 @@ class Session:
             raise ModelError(f"{ended}; see its log") from error
 
 
-class _OfThread(threading.local):
-    session: Session | None = None
-
-
 class RemotePolicy:
     """A policy behind a server; see `Policy`.
 
@@ -174,9 +170,8 @@ class RemotePolicy:
     def __init__(self, name: str, options: SocketPolicyOptions) -> None:
         self.name = name
         self._options = options
-        self._here = _OfThread()
-        self._here.session = first = self.session(name, options)
-        self._sessions = {first}
+        first = self.session(name, options)
+        self._sessions = {get_ident(): first}  # by their threads
         self._said = {"server": first.greeting, "actions": asdict(first.convention)}
 
     @classmethod
@@ -202,11 +197,10 @@ class RemotePolicy:
 
     def begin(self, episode: Episode) -> None:
         """See `Policy`; connects again where the connection is lost (ModelError)."""
-        session = self._here.session
+        session = self._sessions.get(get_ident())
         if session is None or not session.is_open:
             self._drop()
-            session = self._here.session = self.session(self.name, self._options)
-            self._sessions.add(session)
+            session = self._sessions[get_ident()] = self.session(self.name, self._options)
         with self._dropping():
             if session.greeting != self._said["server"]:
                 hint = "begin a new run"
@@ -226,10 +220,10 @@ class RemotePolicy:
     def close(self) -> None:
         """Close the connections of all threads."""
         while self._sessions:
-            self._sessions.pop().close()
+            self._sessions.popitem()[1].close()
 
     def _begun(self) -> Session:
-        session = self._here.session
+        session = self._sessions.get(get_ident())
         if session is None or session.episode is None:
             raise ModelError(f"{self.name}: no episode goes on; call begin() first")
         return session
@@ -243,8 +237,6 @@ class RemotePolicy:
             raise
 
     def _drop(self) -> None:
-        session = self._here.session
-        self._here.session = None
+        session = self._sessions.pop(get_ident(), None)
         if session is not None:
-            self._sessions.discard(session)
             session.close()

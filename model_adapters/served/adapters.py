@@ -1,9 +1,13 @@
 """The adapters of models behind a server, one for each dialect."""
 
 from dataclasses import fields
-from typing import TYPE_CHECKING, ClassVar
+from typing import Any, ClassVar
 from urllib.parse import urlsplit
 
+from model_adapters.served.anthropic import AnthropicDialect
+from model_adapters.served.gemini import GeminiDialect
+from model_adapters.served.model import ServedModel
+from model_adapters.served.openai import OpenAIDialect
 from model_adapters.served.options import (
     AnthropicOptions,
     GeminiOptions,
@@ -12,55 +16,38 @@ from model_adapters.served.options import (
 )
 from model_adapters.served.secret import Secret, read_key
 
-if TYPE_CHECKING:
-    from model_adapters.served.model import ServedModel
+
+class _ServedAdapter:
+    """Base of the adapters, each with the options and the class of its dialect."""
+
+    Options: ClassVar[type[ServedOptions]]
+    dialect: ClassVar[type[Any]]
+
+    @classmethod
+    def build(cls, name: str, options: ServedOptions, seed: int) -> ServedModel:  # noqa: ARG003
+        """Build the client; the first request is sent by the first reply."""
+        return ServedModel(name, options, _key(options), cls.dialect(name, options))
 
 
-class OpenAI:
+class OpenAI(_ServedAdapter):
     """The adapter `openai`: any model behind a server with OpenAI's chat completions."""
 
-    Options: ClassVar[type] = OpenAIOptions
-
-    @classmethod
-    def build(cls, name: str, options: OpenAIOptions, seed: int) -> "ServedModel":  # noqa: ARG003
-        """Build the client; the first request is sent by the first reply."""
-        from model_adapters.served.model import ServedModel
-        from model_adapters.served.openai import OpenAIDialect
-
-        return ServedModel(name, options, _key(options), OpenAIDialect(name, options))
+    Options = OpenAIOptions
+    dialect = OpenAIDialect
 
 
-class Anthropic:
+class Anthropic(_ServedAdapter):
     """The adapter `anthropic`: any model behind a server with Anthropic's messages."""
 
-    Options: ClassVar[type] = AnthropicOptions
-
-    @classmethod
-    def build(
-        cls,
-        name: str,
-        options: AnthropicOptions,
-        seed: int,  # noqa: ARG003
-    ) -> "ServedModel":
-        """See `OpenAI`."""
-        from model_adapters.served.anthropic import AnthropicDialect
-        from model_adapters.served.model import ServedModel
-
-        return ServedModel(name, options, _key(options), AnthropicDialect(name, options))
+    Options = AnthropicOptions
+    dialect = AnthropicDialect
 
 
-class Gemini:
+class Gemini(_ServedAdapter):
     """The adapter `gemini`: any model behind a server with the Gemini API."""
 
-    Options: ClassVar[type] = GeminiOptions
-
-    @classmethod
-    def build(cls, name: str, options: GeminiOptions, seed: int) -> "ServedModel":  # noqa: ARG003
-        """See `OpenAI`."""
-        from model_adapters.served.gemini import GeminiDialect
-        from model_adapters.served.model import ServedModel
-
-        return ServedModel(name, options, _key(options), GeminiDialect(name, options))
+    Options = GeminiOptions
+    dialect = GeminiDialect
 
 
 def _key(options: ServedOptions) -> Secret:

@@ -5,7 +5,7 @@ from typing import Any, Protocol, TypeVar
 
 import msgspec
 
-from infthor_eval.errors import ModelError, in_one_line
+from infthor_eval.errors import ModelError, wrap_errors
 from model_adapters.served.wire import StatusError
 
 T = TypeVar("T")
@@ -69,14 +69,11 @@ class Completion(Protocol):
 
 def decode_reply(where: str, content: bytes, kind: type[T], what: str) -> T:
     """Parse a server's reply, which may be anything; what is left raw in it is text in UTF-8."""
-    try:
+    problem = f"{where} does not answer with {what}"
+    hint = "is it a chat model's address?"
+    with wrap_errors(problem, hint, catch=_UNREADABLE, raise_as=ModelError):
         content.decode()
         return msgspec.json.decode(content, type=kind)
-    except _UNREADABLE as error:
-        raise ModelError(
-            f"{where} does not answer with {what} ({in_one_line(error)}); is it a chat model's "
-            "address?"
-        ) from error
 
 
 def read_usage(

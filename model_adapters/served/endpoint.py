@@ -41,8 +41,11 @@ _HINTS = {
     500: "see the server's log",
 }
 _RETRY_DELAY = re.compile(rb'"retryDelay":\s*"(\d{1,9}(?:\.\d{1,9})?)s"')  # Google's, in the body
-# A message of vLLM's.
+# A message of vLLM's, and the hint to it.
 _TOO_MANY_FRAMES = b"may be provided in one prompt"
+_MORE_FRAMES = (
+    "start the server with a higher --limit-mm-per-prompt '{\"image\": N}', or use fewer frames"
+)
 
 
 class _TransientError(Exception):
@@ -157,7 +160,7 @@ class Endpoint:
     def _classify(self, error: StatusError) -> _TransientError | ModelError:
         status = error.status
         problem = self.describe(status, error.content)
-        hint = _hint_of(error.content) or self.hint_to(status)
+        hint = _MORE_FRAMES if _TOO_MANY_FRAMES in error.content else self._hint_to(status)
         if not is_transient(status) or (status == 429 and _QUOTA_EXCEEDED in error.content):
             return ModelError(f"{self.where} {problem}; {hint}")
         wait_s = _retry_after_s(error.headers)
@@ -175,7 +178,7 @@ class Endpoint:
         phrase = f" {HTTPStatus(status).phrase}" if status in set(HTTPStatus) else ""
         return f"answers {status}{phrase}: {self._quote(body)}"
 
-    def hint_to(self, status: int) -> str:
+    def _hint_to(self, status: int) -> str:
         """Return how to fix what a status says."""
         return _HINTS.get(status) or _HINTS.get(status // 100 * 100) or self._hint
 
@@ -183,16 +186,6 @@ class Endpoint:
         text = self._secret.redact(body.decode("utf-8", "replace"))
         short = " ".join(text.split())[:_QUOTED]
         return repr(short) if short else "nothing"
-
-
-def _hint_of(body: bytes) -> str | None:
-    """Return the hint to a refusal that a server has its own words for; None for others."""
-    if _TOO_MANY_FRAMES in body:
-        return (
-            "start the server with a higher --limit-mm-per-prompt '{\"image\": N}', or use fewer "
-            "frames"
-        )
-    return None
 
 
 def _pause_s(n_faults: int, fault: _TransientError) -> float:

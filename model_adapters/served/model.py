@@ -15,8 +15,8 @@ from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.pictures.video import Video
 from infthor_eval.storage.digests import SIZE, canonical_json, digest
-from model_adapters.backend import BackendConversation
-from model_adapters.protocols import Capabilities, Conversation, Decoding, Reply, Turn
+from model_adapters.backend import UncountedBackend
+from model_adapters.protocols import Capabilities, Decoding, Reply, Turn
 from model_adapters.served.batches.queue import BatchQueue, BatchRules
 from model_adapters.served.batches.service import BatchReply, BatchService
 from model_adapters.served.completion import Completion, TokenUsage
@@ -65,7 +65,7 @@ class Dialect(Protocol):
         """Return the part of the server that takes batches."""
 
 
-class ServedModel:
+class ServedModel(UncountedBackend):
     """A model behind a server. Every request has the whole conversation; the server may cache
     common prefixes."""
 
@@ -103,16 +103,6 @@ class ServedModel:
         address are unknown."""
         return {"adapter": self.name} | self._options.document()
 
-    def tokens_per_frame(self, frame: FrameRef) -> None:
-        """Return None: only the server counts, and only sent requests."""
-
-    def conversation(self) -> Conversation:
-        """Return a new, empty conversation."""
-        return BackendConversation(self)
-
-    def count(self, turns: Sequence[Turn]) -> None:
-        """Return None, as `tokens_per_frame`."""
-
     def answer(self, turns: Sequence[Turn], decoding: Decoding) -> Reply:
         """Answer a conversation; see `Conversation.reply`."""
         if self._queue is not None:
@@ -130,7 +120,7 @@ class ServedModel:
         """Answer one after the other, because answers before a failure are paid for; see
         `Conversation.replies`."""
         if self._queue is None:
-            return [self.answer(turns, decoding) for turns in conversations]
+            return super().answer_each(conversations, decoding)
         return [self._answer_in_batch(self._queue, turns, decoding) for turns in conversations]
 
     def open_batches(

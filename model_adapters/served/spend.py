@@ -110,9 +110,7 @@ class Spend:
         far; None without caps. The first one is unpredictable, so it goes alone.
         """
         with self._changed:
-            reason = self._refusal()
-            if reason is not None:
-                raise NotAskedError(reason)
+            self._check_caps()
             if self._caps == Caps():
                 return None
             rooms = [1.0] if not self._most_tokens else []
@@ -132,9 +130,7 @@ class Spend:
         with self._changed:
             while self._in_flight and self._may_reach_cap_in_flight():
                 self._changed.wait()
-            reason = self._refusal()
-            if reason is not None:
-                raise NotAskedError(reason)
+            self._check_caps()
             self._in_flight += 1
 
     def _settle(self, charge: Charge) -> None:
@@ -164,24 +160,23 @@ class Spend:
             or _is_reached(cost, self._caps.cost)
         )
 
-    def _refusal(self) -> str | None:
-        """Return why no more requests may be sent, or None if they may."""
+    def _check_caps(self) -> None:
+        """Raise `NotAskedError` if no more requests may be sent."""
         if self._has_unknown_usage and self._caps != Caps():
-            return (
+            raise NotAskedError(
                 f"not asked: {self._name} does not report the usage of its replies, so caps cannot "
                 "be enforced; leave out max_tokens_total and max_cost"
             )
         hint = "raise it and run the same command again, which resumes"
         if _is_reached(self._tokens, self._caps.tokens):
-            return (
+            raise NotAskedError(
                 f"not asked: {self._tokens} tokens reach max_tokens_total={self._caps.tokens}; "
                 f"{hint}"
             )
         if _is_reached(self._cost, self._caps.cost):
-            return (
+            raise NotAskedError(
                 f"not asked: {self._cost:.4f} US dollars reach max_cost={self._caps.cost:g}; {hint}"
             )
-        return None
 
 
 def _is_reached(used: float, cap: float | None) -> bool:

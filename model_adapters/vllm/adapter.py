@@ -1,15 +1,10 @@
 """Adapters of the families of `hf/` with their weights in vLLM."""
 
-import functools
 from typing import Any, ClassVar
 
 from model_adapters.hf.adapter import CheckpointAdapter
 from model_adapters.hf.families.hf_lm import HfLm, TextFamily
-from model_adapters.hf.families.hf_vlm import (
-    HfVlm,
-    ProcessorFamily,
-    family_of,
-)
+from model_adapters.hf.families.hf_vlm import HfVlm, find_family
 from model_adapters.hf.families.llava_onevision import LlavaOnevision
 from model_adapters.hf.families.load_check import require_same_ids
 from model_adapters.hf.families.pixtral import Pixtral
@@ -21,7 +16,6 @@ from model_adapters.hf.loading.checkpoint import (
     build_meta_model,
     read_checkpoint,
 )
-from model_adapters.hf.loading.processors import load_processor
 from model_adapters.vllm.arguments import frame_limit, model_arguments, token_limit
 from model_adapters.vllm.cpu import check_kernels, runs_on_cpu
 from model_adapters.vllm.engine import Engine, import_vllm, require_version
@@ -71,13 +65,7 @@ class HfVlmOnVllm:
         """Start vLLM with any checkpoint that it supports."""
         import_vllm(name)
         located = HfVlm.locate(name, options)
-        family = family_of(located.config)
-        if family is not None:
-            return _start(name, located, family)
-        processor = load_processor(located)
-        return _start(
-            name, located, functools.partial(ProcessorFamily, processor=processor), processor
-        )
+        return _start(name, located, *find_family(located))
 
 
 class HfLmOnVllm:

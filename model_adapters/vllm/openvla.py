@@ -1,5 +1,6 @@
 """OpenVLA in vLLM, with prompt, action tokens and statistics of the native port."""
 
+from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import msgspec
@@ -54,9 +55,10 @@ class OpenVLAOnVllm:
             "batch_invariant": engine.batch_invariant,
             "unnorm_key": description.key,
         }
-        return VllmPolicy(
-            name, _VllmNetwork(name, engine, description), description, options, identity
-        )
+        network = _VllmNetwork(name, engine, description)
+        side = description.config.image_size(options.pretrained)
+        crop = side if options.center_crop else None
+        return VllmPolicy(name, network, description.statistics, options, identity, crop=crop)
 
 
 class _TokenizerConfig(msgspec.Struct):
@@ -76,17 +78,17 @@ def _check_begin_token(name: str, checkpoint: PolicyCheckpoint) -> None:
         )
 
 
+@dataclass(frozen=True)
 class _VllmNetwork:
     """A network that lets vLLM decode the action tokens."""
 
-    def __init__(self, name: str, engine: Engine, description: OpenVLADescription) -> None:
-        self.engine = engine
-        self._name = name
-        self._description = description
+    name: str
+    engine: Engine
+    description: OpenVLADescription
 
     def predict(self, image: Image.Image, instruction: str, *, constrained: bool) -> Actions:
         """Return a chunk of one action; see `Network.predict` of the policies."""
-        action_ids = self._description.bins.action_ids
+        action_ids = self.description.bins.action_ids
         settings: dict[str, Any] = {
             "max_tokens": ACTION_SIZE,
             "temperature": 0.0,
@@ -94,14 +96,14 @@ class _VllmNetwork:
         }
         if constrained:
             settings["allowed_token_ids"] = list(action_ids)
-        request = EngineRequest(prompt_ids(self._description.tokenizer, instruction), [image])
+        request = EngineRequest(prompt_ids(self.description.tokenizer, instruction), [image])
         (output,) = self.engine.generate([request], settings)
         if len(output.ids) != ACTION_SIZE:
             raise ModelError(
-                f"{self._name}: vLLM wrote {len(output.ids)} action tokens, not {ACTION_SIZE}; "
+                f"{self.name}: vLLM wrote {len(output.ids)} action tokens, not {ACTION_SIZE}; "
                 "report it"
             )
-        return self._description.bins.decode(
+        return self.description.bins.decode(
             np.clip(output.ids, action_ids.start, action_ids.stop - 1).tolist()
         )
 
@@ -109,18 +111,7 @@ class _VllmNetwork:
 class VllmPolicy(VlaPolicy):
     """A policy whose weights are in vLLM."""
 
-    def __init__(
-        self,
-        name: str,
-        network: _VllmNetwork,
-        description: OpenVLADescription,
-        options: OpenVLAOnVllmOptions,
-        identity: dict[str, Any],
-    ) -> None:
-        side = description.config.image_size(options.pretrained)
-        crop = side if options.center_crop else None
-        super().__init__(name, network, description.statistics, options, identity, crop=crop)
-        self._engine = network.engine
+    _network: _VllmNetwork
 
     @property
     def capabilities(self) -> Capabilities:
@@ -129,4 +120,4 @@ class VllmPolicy(VlaPolicy):
 
     def close(self) -> None:
         """Stop vLLM."""
-        self._engine.close()
+        self._network.engine.close()

@@ -7,9 +7,10 @@ around, and comes back to where an arm reaches both.
 
 import math
 import random
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import combinations, permutations
+from itertools import combinations, islice, permutations
 from typing import Any
 
 from msgspec.structs import replace
@@ -85,8 +86,8 @@ class Brought:
     end: Viewpoint
 
 
-def errands(view: SimulatorView, rng: random.Random) -> Iterator[Errand]:
-    """Yield what a room has for such worlds, in random order."""
+def errands(view: SimulatorView, rng: random.Random) -> list[Errand]:
+    """Return what a room has for such worlds, in random order."""
     objects = view.objects
     surfaces = [obj for obj in objects.values() if obj.object_type in _SURFACES]
     holders = {parent for obj in objects.values() for parent in obj.parent_receptacles or ()}
@@ -95,10 +96,7 @@ def errands(view: SimulatorView, rng: random.Random) -> Iterator[Errand]:
         parent = direct_parent(obj, objects)
         if obj.pickupable and obj.object_id not in holders and parent is not None:
             loose.append((obj, objects[parent]))
-    counts: dict[str, int] = {}
-    for obj in objects.values():
-        name = canonical_type(obj.object_type)
-        counts[name] = counts.get(name, 0) + 1
+    counts = Counter(canonical_type(obj.object_type) for obj in objects.values())
     alone = [pair for pair in loose if counts[canonical_type(pair[0].object_type)] == 1]
     found = [
         Errand((one, other), (place, there), surface)
@@ -109,7 +107,7 @@ def errands(view: SimulatorView, rng: random.Random) -> Iterator[Errand]:
         and all(goes_into(obj.object_type, surface.object_type) for obj in (one, other))
     ]
     rng.shuffle(found)
-    yield from found
+    return found
 
 
 def _may_exchange(
@@ -134,7 +132,7 @@ def bring(
         EditRefused: the room or the simulator does not allow it; the message is the reason.
         SimulatorError: the simulator fails.
     """
-    puts_of_both = list(_stands(errand, scene, simulator, rng))
+    puts_of_both = list(islice(_stands(errand, scene, simulator, rng), _MOST_TRIALS))
     if not puts_of_both:
         raise EditRefused("no two places to put from")
     one, other = errand.things
@@ -167,7 +165,8 @@ def _carry_out(
     things = ids[errand.things[0].name], ids[errand.things[1].name]
     surface = errand.surface.object_id
     grid = reachable_grid(simulator)
-    begin = Viewpoint(grid_pose_of(simulator.view.agent, grid), _horizon(simulator))
+    agent = simulator.view.agent
+    begin = Viewpoint(grid_pose_of(agent, grid), round(agent.horizon))
     trace = Trace(simulator)
     walker = Walker(trace)
     rollout = Rollout(trace, walker)
@@ -187,17 +186,8 @@ def _carry_out(
     tail = len(trace.actions) - n_before
     if tail < _TAIL:
         raise EditRefused("the agent begins too near")
-    return Brought(
-        scene,
-        trace,
-        simulator.view,
-        things,
-        order,
-        (taken[0], taken[1]),
-        (put[0], put[1]),
-        tail,
-        end,
-    )
+    handled = (taken[0], taken[1]), (put[0], put[1])
+    return Brought(scene, trace, simulator.view, things, order, *handled, tail, end)
 
 
 def _stands(
@@ -206,23 +196,17 @@ def _stands(
     """Yield pairs of poses from which the surface is seen, side by side, in random order."""
     restore(simulator, scene)
     grid = reachable_grid(simulator)
-    standing = (
-        GridPose(cell, facing) for cell in sorted(grid.cells) for facing in (0, 90, 180, 270)
-    )
     poses = [
-        Viewpoint(pose, _HORIZON)
-        for pose in standing
-        if _faces(grid.position(pose.cell), pose.facing, errand.surface)
+        Viewpoint(GridPose(cell, facing), _HORIZON)
+        for cell in sorted(grid.cells)
+        for facing in (0, 90, 180, 270)
+        if _faces(grid.position(cell), facing, errand.surface)
     ]
     pairs = [pair for pair in permutations(poses, 2) if _side_by_side(grid, *pair)]
     rng.shuffle(pairs)
-    n_found = 0
     for pair in pairs[: 4 * _MOST_TRIALS]:
-        if n_found == _MOST_TRIALS:
-            return
         views = [_seen_from(simulator, grid, one, **NO_RENDERING) for one in pair]
         if all(view.success and view.objects[errand.surface.object_id].visible for view in views):
-            n_found += 1
             yield pair
 
 
@@ -337,7 +321,3 @@ def _states(view: SimulatorView) -> dict[str, ThorObject]:
         )
         for obj in view.objects.values()
     }
-
-
-def _horizon(simulator: Simulator) -> int:
-    return round(simulator.view.agent.horizon)

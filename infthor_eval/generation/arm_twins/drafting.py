@@ -66,7 +66,7 @@ def draft_arm_twins(
     rng = random.Random(stream)
     rejected: dict[str, int] = {}
     used: set[str] = set()
-    for number, errand in enumerate(list(errands(simulator.view, rng))[:_MOST_ERRANDS]):
+    for number, errand in enumerate(errands(simulator.view, rng)[:_MOST_ERRANDS]):
         if len(draft.pairs) == settings.per_kind:
             break
         names = {thing.name for thing in errand.things}
@@ -119,24 +119,16 @@ class _Asked:
     things: tuple[int, int]
 
 
+@dataclass(frozen=True)
 class _Maker:
     """Makes a pair."""
 
-    def __init__(
-        self,
-        draft: TwinDraft,
-        errand: Errand,
-        pair_id: str,
-        reaches: Reaches,
-        simulator: Simulator,
-        out: Path,
-    ) -> None:
-        self._draft = draft
-        self._errand = errand
-        self._pair_id = pair_id
-        self._reaches = reaches
-        self._simulator = simulator
-        self._out = out
+    draft: TwinDraft
+    errand: Errand
+    pair_id: str
+    reaches: Reaches
+    simulator: Simulator
+    out: Path
 
     def make(self, scene: Scene, rng: random.Random) -> TwinPair:
         """Return the pair, whose worlds are written.
@@ -145,19 +137,19 @@ class _Maker:
             EditRefused: the rooms do not allow it.
             Difference: the worlds end with other pictures.
         """
-        brought = bring(self._errand, scene, self._simulator, rng)
-        if not self._reaches(brought[0].scene, brought[0].view, brought[0].things):
+        brought = bring(self.errand, scene, self.simulator, rng)
+        if not self.reaches(brought[0].scene, brought[0].view, brought[0].things):
             raise EditRefused("an arm does not reach both things")
         lengths = [len(one.trace.actions) for one in brought]
         first, second = (
             _World(one, _wait(max(lengths) - length))
             for one, length in zip(brought, lengths, strict=True)
         )
-        worlds = (second, first) if is_flipped(self._pair_id) else (first, second)
+        worlds = (second, first) if is_flipped(self.pair_id) else (first, second)
         asked = self._ask(worlds, rng, is_exchanged=worlds[0] is second)
-        names = name_worlds(self._draft.rooms, self._pair_id)
+        names = name_worlds(self.draft.rooms, self.pair_id)
         with ExitStack() as stack:
-            replays = Replays(self._simulator, stack)
+            replays = Replays(self.simulator, stack)
             made = [replays.replayed(world.trajectory(WORLD)) for world in worlds]
             one, other = (replayed.world.pictures for replayed in made)
             frames = tuple(ComparedFrame(a == b) for a, b in zip(one, other, strict=True))
@@ -166,19 +158,19 @@ class _Maker:
             for side, (world, replayed) in enumerate(zip(worlds, made, strict=True)):
                 choices = [self._choice(worlds, question, side) for question in asked]
                 whole = replace(world.trajectory(names[side]), arm_choices=choices)
-                replayed.write(self._out, whole, replayed.world.files)
+                replayed.write(self.out, whole, replayed.world.files)
         ids = dict(zip(*(world.brought.things for world in worlds), strict=True))
         return TwinPair(
-            id=self._pair_id,
+            id=self.pair_id,
             kind=KIND,
-            seed=self._draft.settings.seed,
-            base=self._draft.digest,
+            seed=self.draft.settings.seed,
+            base=self.draft.digest,
             traj_ids=names,
-            floor_plan=self._draft.rooms,
+            floor_plan=self.draft.rooms,
             ids=ids,
             changed=tuple(sorted(worlds[0].brought.things)),
             displaced=(),
-            types=tuple(sorted(thing.object_type for thing in self._errand.things)),
+            types=tuple(sorted(thing.object_type for thing in self.errand.things)),
             frames=frames,
             questions=tuple(self._paired(worlds, question) for question in asked),
         )
@@ -188,7 +180,7 @@ class _Maker:
     ) -> list[_Asked]:
         """Return a question about a place, and one about the order, each drawn of two."""
         place = rng.randrange(2)
-        words = in_or_on(self._errand.places[place].object_type)
+        words = in_or_on(self.errand.places[place].object_type)
         there = (1 - place, place) if is_exchanged else (place, 1 - place)
         at = rng.randrange(2)
         first, second = (world.brought.order[at] for world in worlds)
@@ -219,8 +211,8 @@ class _Maker:
         things = worlds[side].brought.things
         thing = asked.things[side]
         return ArmChoice(
-            pair=f"{self._pair_id}/{asked.form}",
-            base=self._draft.digest,
+            pair=f"{self.pair_id}/{asked.form}",
+            base=self.draft.digest,
             instruction=asked.instruction,
             target=things[thing],
             other=things[1 - thing],

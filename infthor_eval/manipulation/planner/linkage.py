@@ -78,11 +78,8 @@ class Poses:
     @staticmethod
     def join(several: "list[Poses]") -> "Poses":
         """Concatenate poses."""
-        return Poses(
-            np.concatenate([poses.wrists for poses in several]),
-            np.concatenate([poses.bases for poses in several]),
-            np.concatenate([poses.turns for poses in several]),
-        )
+        parts = zip(*((poses.wrists, poses.bases, poses.turns) for poses in several), strict=True)
+        return Poses(*map(np.concatenate, parts))
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ import itertools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.random import Generator
@@ -142,26 +143,20 @@ def _aim(view: SimulatorView, goal: Point) -> Call:
 
 
 def _move_base(share: float) -> Call:
-    return {"action": "MoveArmBase", "y": share, "returnToStart": False}
+    return _staying("MoveArmBase", y=share)
 
 
 def _move_wrist(place: Point) -> Call:
-    return {
-        "action": "MoveArm",
-        "position": xyz(place),
-        "coordinateSpace": "world",
-        "returnToStart": False,
-    }
+    return _staying("MoveArm", position=xyz(place), coordinateSpace="world")
 
 
 def _turn_wrist(pitch: float, yaw: float, roll: float) -> Call:
-    return {
-        "action": "RotateWristRelative",
-        "pitch": pitch,
-        "yaw": yaw,
-        "roll": roll,
-        "returnToStart": False,
-    }
+    return _staying("RotateWristRelative", pitch=pitch, yaw=yaw, roll=roll)
+
+
+def _staying(action: str, **arguments: Any) -> Call:
+    """Return the call of a movement after which the arm stays where it is, collided or not."""
+    return {"action": action, **arguments, "returnToStart": False}
 
 
 def _elevation(direction: Point) -> float:

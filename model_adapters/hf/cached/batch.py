@@ -11,7 +11,7 @@ from model_adapters.hf.cached.decoding import ReplyState, decode_replies
 from model_adapters.hf.cached.kv_cache import cache_arguments
 from model_adapters.hf.cached.prefix import Prefix, chunks
 from model_adapters.hf.kept.cutting import CutPrefix
-from model_adapters.hf.prompting.embedding import Embed, Span
+from model_adapters.hf.prompting.embedding import Span
 from model_adapters.hf.prompting.prompt import Piece, token_ids
 
 _Span = tuple[int, Span]  # of a branch
@@ -20,11 +20,9 @@ _Span = tuple[int, Span]  # of a branch
 class _Branches:
     """Continuations of so many pieces of a prefix, each with the positions that it has alone."""
 
-    def __init__(
-        self, model: Any, embed: Embed, prefix: Prefix | CutPrefix, n_shared: Sequence[int]
-    ) -> None:
-        self._model = model
-        self._embed = embed
+    def __init__(self, prefix: Prefix | CutPrefix, n_shared: Sequence[int]) -> None:
+        self._model = model = prefix.model
+        self._embed = prefix.embed
         self._prefix = prefix
         self._ends = [prefix.behind(n) for n in n_shared]  # position of the next token of each
         self._lengths = [prefix.tokens_in(n) for n in n_shared]  # tokens of each, with the prefix
@@ -38,18 +36,17 @@ class _Branches:
         )
 
     @torch.inference_mode()
-    def feed(self, continuations: Sequence[Sequence[Piece]], chunk_tokens: int) -> torch.Tensor:
+    def feed(self, continuations: Sequence[Sequence[Piece]]) -> torch.Tensor:
         """Encode all continuations; return each next token's logits, (branches, vocabulary)."""
         logits: dict[int, torch.Tensor] = {}
-        for group in self._groups(continuations, chunk_tokens):
+        for group in self._groups(continuations):
             # The last chunk of a branch has the logits of its next token.
             logits |= self._forward(group)
         return torch.stack([logits[branch] for branch in range(len(continuations))])
 
-    def _groups(
-        self, continuations: Sequence[Sequence[Piece]], chunk_tokens: int
-    ) -> Iterator[list[_Span]]:
+    def _groups(self, continuations: Sequence[Sequence[Piece]]) -> Iterator[list[_Span]]:
         """Yield chunks of branches that are encoded in one forward pass."""
+        chunk_tokens = self._prefix.chunk_tokens
         group: list[_Span] = []
         n_tokens = 0
         for branch, pieces in enumerate(continuations):
@@ -106,14 +103,10 @@ class _Branches:
 
 
 def answer_together(
-    model: Any,
-    embed: Embed,
-    *,
     prefix: Prefix | CutPrefix,
     prompts: Sequence[Sequence[Piece]],
     n_shared: Sequence[int],
     replies: Sequence[ReplyState],
-    chunk_tokens: int,
 ) -> None:
     """Decode the replies to prompts whose first pieces, so many of each, are those of `prefix`.
 
@@ -121,26 +114,19 @@ def answer_together(
     are empty, one for each prompt.
     """
     continuations = [prompt[n:] for prompt, n in zip(prompts, n_shared, strict=True)]
-    branches = _Branches(model, embed, prefix, n_shared)
+    branches = _Branches(prefix, n_shared)
     with prefix.extended(continuations, sum(reply.decoding.max_new_tokens for reply in replies)):
-        decode_replies(branches.feed(continuations, chunk_tokens), branches.step, replies)
+        decode_replies(branches.feed(continuations), branches.step, replies)
 
 
-def encode_together(
-    model: Any,
-    embed: Embed,
-    *,
-    prefix: Prefix,
-    continuations: Sequence[Sequence[Piece]],
-    chunk_tokens: int,
-) -> torch.Tensor:
+def encode_together(prefix: Prefix, continuations: Sequence[Sequence[Piece]]) -> torch.Tensor:
     """Encode continuations of a prefix, of two pieces or more; the last of each is a token of text
     and fed as tokens of replies are.
 
     Returns:
         Logits of each next token, (continuations, vocabulary).
     """
-    branches = _Branches(model, embed, prefix, [prefix.n_pieces] * len(continuations))
+    branches = _Branches(prefix, [prefix.n_pieces] * len(continuations))
     with prefix.extended(continuations, 0):
-        branches.feed([pieces[:-1] for pieces in continuations], chunk_tokens)
+        branches.feed([pieces[:-1] for pieces in continuations])
         return branches.step(dict(enumerate(token_ids([pieces[-1] for pieces in continuations]))))

@@ -9,7 +9,7 @@ from infthor_eval.errors import ModelError
 from model_adapters.hf.cached.batch import answer_together, encode_together
 from model_adapters.hf.cached.branch_attention import layer_windows
 from model_adapters.hf.cached.decoding import ReplyState, decode_replies
-from model_adapters.hf.cached.prefix import Prefix
+from model_adapters.hf.cached.prefix import Prefix, PrefixStore
 from model_adapters.hf.cached.replies import begin_reply, end_reply
 from model_adapters.hf.checkpoint_model import HfModel
 from model_adapters.hf.global_settings import torch_threads
@@ -19,7 +19,6 @@ from model_adapters.hf.kept.cutting import (
     grouped,
     method_of,
 )
-from model_adapters.hf.kept.store import PrefixStore
 from model_adapters.hf.kept.view import CacheView
 from model_adapters.hf.limits import check_limit, wrap_memory_errors, wrap_model_errors
 from model_adapters.hf.loading.loaded import LoadedCheckpoint
@@ -129,13 +128,7 @@ class TransformersModel(HfModel):
         common = n_common([prompt[:-1] for prompt in prompts])
         self._prefix.reset()
         self._prefix.feed(prompts[0][:common])
-        return encode_together(
-            self._loaded.model,
-            self._embed,
-            prefix=self._prefix,
-            continuations=[prompt[common:] for prompt in prompts],
-            chunk_tokens=self._chunk_tokens,
-        )
+        return encode_together(self._prefix, [prompt[common:] for prompt in prompts])
 
     def answer_each(
         self, conversations: Sequence[Sequence[Turn]], decoding: Decoding
@@ -222,18 +215,15 @@ class TransformersModel(HfModel):
     ) -> list[int]:
         """Decode replies one after the other; return how many tokens of each prompt were in the
         cache."""
-        return [
-            self._decode_one(prompt, reply) for prompt, reply in zip(prompts, replies, strict=True)
-        ]
-
-    def _decode_one(self, prompt: Sequence[Piece], reply: ReplyState) -> int:
-        shared = self._prefix.rewind_to(prompt)
-        cached = self._prefix.n_tokens
-        logits = self._prefix.feed(prompt[shared:], reserve=reply.decoding.max_new_tokens)
-        decode_replies(
-            logits[None], lambda tokens: self._prefix.step(list(tokens.values()))[None], [reply]
-        )
-        return cached
+        n_cached = []
+        for prompt, reply in zip(prompts, replies, strict=True):
+            shared = self._prefix.rewind_to(prompt)
+            n_cached.append(self._prefix.n_tokens)
+            logits = self._prefix.feed(prompt[shared:], reserve=reply.decoding.max_new_tokens)
+            decode_replies(
+                logits[None], lambda tokens: self._prefix.step(list(tokens.values()))[None], [reply]
+            )
+        return n_cached
 
     def _decode_behind_cuts(
         self, prompts: Sequence[Sequence[Piece]], cut: CacheCut, replies: Sequence[ReplyState]
@@ -246,25 +236,17 @@ class TransformersModel(HfModel):
                 "rotary frequencies depend on the length; use a memory of frames"
             )
         asks = method_of(cut).asks
-        config = self._loaded.model.get_decoder().config
         n_cached: list[int] = []
         kept: list[KeptCache | None] = []
         for group in grouped(prompts, together=not asks):
             prefix, n_known = self._encoded.encode(group.before, exactly=asks)
             view = CacheView.of(prefix, group.before, group.n_opening, cut)
             if asks:
-                view.attention = attention_of(prefix, config, group.afters[0])
+                view.attention = attention_of(prefix, group.afters[0])
             n_before = len(group.before)
-            cut_prefix = CutPrefix(config, view, cut, prefix.behind(n_before))
-            answer_together(
-                self._loaded.model,
-                self._embed,
-                prefix=cut_prefix,
-                prompts=group.afters,
-                n_shared=[0] * len(group.afters),
-                replies=[replies[number] for number in group.numbers],
-                chunk_tokens=self._chunk_tokens,
-            )
+            cut_prefix = CutPrefix(prefix, view, cut, prefix.behind(n_before))
+            own = [replies[number] for number in group.numbers]
+            answer_together(cut_prefix, group.afters, [0] * len(own), own)
             known = [n_known, *[n_before] * (len(group.afters) - 1)]
             n_cached += map(prefix.tokens_in, known)
             kept += [cut_prefix.kept] * len(group.afters)
@@ -284,14 +266,6 @@ class TransformersModel(HfModel):
         n_cached = self._prefix.n_tokens
         if cached < most:
             self._prefix.feed(longest[cached:most])
-        answer_together(
-            self._loaded.model,
-            self._embed,
-            prefix=self._prefix,
-            prompts=prompts,
-            n_shared=n_shared,
-            replies=replies,
-            chunk_tokens=self._chunk_tokens,
-        )
+        answer_together(self._prefix, prompts, n_shared, replies)
         in_cache = [self._prefix.tokens_in(n) for n in n_shared]
         return [min(n_cached, in_cache[0]), *in_cache[1:]]

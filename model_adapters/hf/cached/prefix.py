@@ -7,14 +7,15 @@ pass only by rounding.
 """
 
 from bisect import bisect_right
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
+from dataclasses import KW_ONLY, dataclass
 from itertools import accumulate
 from typing import Any
 
 import torch
 
-from model_adapters.hf.cached.kv_cache import BufferedCache, cache_arguments
+from model_adapters.hf.cached.kv_cache import BufferedCache, BufferedLayer, cache_arguments
 from model_adapters.hf.family import Family
 from model_adapters.hf.loading.rope import LengthRope
 from model_adapters.hf.prompting.embedding import Embed
@@ -22,10 +23,11 @@ from model_adapters.hf.prompting.prompt import Piece, end_of_frames, n_tokens, t
 from model_adapters.hf.sparse.reading import SparseReading
 
 
+@dataclass(eq=False)
 class Prefix:
     """The one encoded sequence of a model.
 
-    Args:
+    Attributes:
         model: a transformers model that takes what `embed` makes, `position_ids` and
             `cache_arguments`.
         family: family of the model.
@@ -35,32 +37,25 @@ class Prefix:
             else None.
         storage: device of keys and values; the device of the weights where None.
         sparse: which tokens see which; all earlier ones where None.
+        cache: keys and values of the sequence.
     """
 
-    def __init__(
-        self,
-        model: Any,
-        family: Family,
-        embed: Embed,
-        *,
-        chunk_tokens: int,
-        rope: LengthRope | None = None,
-        storage: torch.device | None = None,
-        sparse: SparseReading | None = None,
-    ) -> None:
-        self._model = model
-        self._family = family
-        self._rope = rope
+    model: Any
+    family: Family
+    embed: Embed
+    _: KW_ONLY
+    chunk_tokens: int
+    rope: LengthRope | None = None
+    storage: torch.device | None = None
+    sparse: SparseReading | None = None
+
+    def __post_init__(self) -> None:
         self._rope_key = -1
-        self._storage = storage
-        self._embed = embed
-        self._chunk_tokens = chunk_tokens
-        self.sparse = sparse
         self.reset()
 
     def reset(self) -> None:
         """Drop the sequence and free its memory."""
-        self._cache = BufferedCache(self._model.get_decoder().config, self._storage)
+        self.cache = BufferedCache(self.model.get_decoder().config, self.storage)
         self._pieces: list[Piece] = []
         self._ends: list[int] = []  # tokens up to the end of each piece
         # Position behind everything before each piece, and of the next token.
@@ -92,24 +87,19 @@ class Prefix:
         """Position of the next token."""
         return self._starts[-1]
 
-    @property
-    def cache(self) -> BufferedCache:
-        """Keys and values of the sequence."""
-        return self._cache
-
     @contextmanager
     def extended(self, continuations: Sequence[Sequence[Piece]], reserve: int) -> Iterator[None]:
         """Let others append to the cache within the context, what these continuations and some more
         tokens need."""
-        n_stored = self._cache.get_seq_length()
-        self._cache.reserve(n_stored + sum(map(n_tokens, continuations)) + reserve)
+        n_stored = self.cache.get_seq_length()
+        self.cache.reserve(n_stored + sum(map(n_tokens, continuations)) + reserve)
         done = False
         try:
             yield
             done = True
         finally:
             if done:
-                self._cache.truncate(self.n_tokens)
+                self.cache.truncate(self.n_tokens)
             else:  # some layers may have cached more than others
                 self.reset()
 
@@ -131,10 +121,10 @@ class Prefix:
         Returns:
             Number of shared pieces.
         """
-        if self._rope is not None:
-            self._set_rope(self._rope, pieces)
+        if self.rope is not None:
+            self._set_rope(self.rope, pieces)
         shared = self.n_common(pieces[:-1])
-        n_tokens = self._cache.cut_before(self.tokens_in(self._whole_chunks(pieces, shared)))
+        n_tokens = self.cache.cut_before(self.tokens_in(self._whole_chunks(pieces, shared)))
         if self.sparse is not None:
             n_tokens = self.sparse.cut_before(n_tokens)
         shared = bisect_right(self._ends, n_tokens, hi=shared)
@@ -147,7 +137,7 @@ class Prefix:
         if self.sparse is None or not self.sparse.goes_by_chunks:
             return shared
         shown = pieces[: self._n_shown(pieces)]
-        ends = [*accumulate(len(chunk) for chunk in chunks(shown, self._chunk_tokens))]
+        ends = [*accumulate(len(chunk) for chunk in chunks(shown, self.chunk_tokens))]
         n_same = 0
         for ours, theirs in zip(self._chunk_ends, ends, strict=False):
             if ours != theirs or ours > shared:
@@ -160,7 +150,7 @@ class Prefix:
         """Set the rotary frequencies for a prompt; a sequence encoded with others is dropped."""
         ids = torch.tensor(list(token_ids(pieces)))
         shapes = [piece.shape for piece in pieces if not isinstance(piece, int)]
-        n_positions = int(self._family.positions(ids, shapes, 0).max()) + 1
+        n_positions = int(self.family.positions(ids, shapes, 0).max()) + 1
         if rope.key(n_positions) != self._rope_key:
             self.reset()
             rope.set(n_positions)
@@ -170,14 +160,14 @@ class Prefix:
         """Keep the first `n_pieces` pieces."""
         del self._pieces[n_pieces:], self._ends[n_pieces:], self._starts[n_pieces + 1 :]
         self._chunk_ends = [end for end in self._chunk_ends if end <= n_pieces]
-        self._cache.truncate(self.n_tokens)
+        self.cache.truncate(self.n_tokens)
         if self.sparse is not None:
             self.sparse.cut(self.n_tokens)
 
     def lengthen(self, n_tokens: int) -> None:
         """Take so many tokens of text as encoded behind the sequence, each like its last token: for
         measuring memory, not for replies."""
-        self._cache.lengthen(n_tokens)
+        self.cache.lengthen(n_tokens)
         ends = range(self.n_tokens + 1, self.n_tokens + n_tokens + 1)
         starts = range(self.end + 1, self.end + n_tokens + 1)
         self._pieces += [0] * n_tokens
@@ -194,7 +184,7 @@ class Prefix:
         Returns:
             Logits of the token that follows the last piece, (vocabulary,).
         """
-        self._embed.expect(pieces)
+        self.embed.expect(pieces)
         logits = None
         n_shown = 0
         if self._reads_in_parts:
@@ -202,16 +192,16 @@ class Prefix:
         shown, asked = pieces[:n_shown], pieces[n_shown:]
         n_stored = self.n_tokens + n_tokens(shown)
         if self.sparse is not None:
-            n_stored = self.sparse.most_stored(n_stored, self._chunk_tokens)
-        self._cache.reserve(n_stored + n_tokens(asked) + reserve)
-        for chunk in chunks(shown, self._chunk_tokens):
+            n_stored = self.sparse.most_stored(n_stored, self.chunk_tokens)
+        self.cache.reserve(n_stored + n_tokens(asked) + reserve)
+        for chunk in chunks(shown, self.chunk_tokens):
             if self.sparse is not None:
-                self.sparse.drop_unseen(self._cache, self.n_tokens)
+                self.sparse.drop_unseen(self.cache, self.n_tokens)
             logits = self._forward(chunk)
             self._chunk_ends.append(self.n_pieces)
         if shown:
-            self._cache.mark()
-        for chunk in chunks(asked, self._chunk_tokens):
+            self.cache.mark()
+        for chunk in chunks(asked, self.chunk_tokens):
             logits = self._forward(chunk, is_asked=True)
         if logits is None:
             raise ValueError("nothing to feed")
@@ -224,19 +214,19 @@ class Prefix:
     @property
     def _reads_in_parts(self) -> bool:
         """True unless the cache can be cut anywhere, and gets all at once."""
-        return self._cache.needs_marks or self.sparse is not None
+        return self.cache.needs_marks or self.sparse is not None
 
     def _n_shown(self, prompt: Sequence[Piece]) -> int:
         """Return how many pieces of a prompt are up to its last frame, behind which prompts on the
         same frames differ; of a text that is read sparsely, those in whole chunks."""
         n = end_of_frames(prompt)
         if not n and self.sparse is not None:
-            return len(prompt) // self._chunk_tokens * self._chunk_tokens
+            return len(prompt) // self.chunk_tokens * self.chunk_tokens
         return n
 
     @torch.inference_mode()
     def _forward(self, chunk: list[Piece], *, is_asked: bool = False) -> torch.Tensor:
-        span = self._embed(chunk, self._starts[-1], self._pieces)
+        span = self.embed(chunk, self._starts[-1], self._pieces)
         attending = (
             nullcontext()
             if self.sparse is None
@@ -245,10 +235,10 @@ class Prefix:
         done = False
         try:
             with attending:
-                output = self._model(
+                output = self.model(
                     **span.inputs,
                     position_ids=span.positions,
-                    **cache_arguments(self._model, self._cache),
+                    **cache_arguments(self.model, self.cache),
                     logits_to_keep=1,
                 )
             done = True
@@ -277,3 +267,49 @@ def chunks(pieces: Sequence[Piece], chunk_tokens: int) -> Iterator[list[Piece]]:
         size += width(piece)
     if chunk:
         yield chunk
+
+
+class PrefixStore:
+    """Sequences that a model has encoded, within a limit of bytes; the longest unused go first.
+
+    Args:
+        make: makes an empty sequence.
+        most_bytes: most bytes of keys and values of all of them; one is kept in any case.
+    """
+
+    def __init__(self, make: Callable[[], Prefix], most_bytes: int) -> None:
+        self._make = make
+        self._most_bytes = most_bytes
+        self._stored: list[Prefix] = []  # the last used one last
+
+    def clear(self) -> None:
+        """Free the memory of all."""
+        self._stored.clear()
+
+    def encode(self, pieces: Sequence[Piece], *, exactly: bool) -> tuple[Prefix, int]:
+        """Return a sequence that begins with these pieces, and how many were encoded already.
+
+        Args:
+            pieces: the pieces.
+            exactly: True if it must end with them.
+        """
+        prefix = max(self._stored, key=lambda it: it.n_common(pieces), default=None)
+        n_known = 0 if prefix is None else prefix.n_common(pieces)
+        if prefix is None or (n_known < len(pieces) and n_known < prefix.n_pieces):
+            prefix = self._make()  # another trajectory's stays as it is
+            n_known = 0
+        else:
+            self._stored.remove(prefix)
+        if n_known < len(pieces):
+            prefix.feed(pieces[n_known:])
+        elif exactly:
+            prefix.cut(len(pieces))
+        self._stored.append(prefix)
+        while len(self._stored) > 1 and sum(map(_n_bytes, self._stored)) > self._most_bytes:
+            del self._stored[0]
+        return prefix, n_known
+
+
+def _n_bytes(prefix: Prefix) -> int:
+    layers = [layer for layer in prefix.cache.layers if isinstance(layer, BufferedLayer)]
+    return sum(layer.n_bytes for layer in layers)

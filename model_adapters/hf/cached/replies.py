@@ -3,8 +3,7 @@
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from model_adapters.hf.cached.choices import read_choices
-from model_adapters.hf.cached.decoding import ReplyState
+from model_adapters.hf.cached.decoding import ReplyState, read_choices
 from model_adapters.hf.loading.loaded import LoadedCheckpoint
 from model_adapters.hf.prompting.hashing import hash_context
 from model_adapters.protocols import Decoding, KeptCache, Reply

@@ -14,11 +14,7 @@ class DeepseekVLFamily(PlainFamily):
 
     def features_of(self, frames: Sequence[Pixels]) -> list[torch.Tensor]:
         """Return the aligned features of both vision towers for each frame, (tokens, hidden)."""
-        inputs = self._inputs(frames)
-        output = self._model.model.get_image_features(
-            inputs["pixel_values"], inputs["high_res_pixel_values"], return_dict=True
-        )
-        return list(output.pooler_output)
+        return self._encoded(frames, "pixel_values", "high_res_pixel_values")
 
 
 class DeepseekVL(CheckpointAdapter):

@@ -177,12 +177,11 @@ class HfVlm:
     def build(cls, name: str, options: HfVlmOptions, seed: int) -> Model:  # noqa: ARG003
         """Load a checkpoint; the seed is not used."""
         located = cls.locate(name, options)
-        family = family_of(located.config)
-        if family is not None:
+        family, processor = find_family(located)
+        if processor is None:
             return load_model(name, located, family)
-        processor = load_processor(located)
         model: TransformersModel | UncachedModel
-        loaded = load_checkpoint(located, partial(ProcessorFamily, processor=processor))
+        loaded = load_checkpoint(located, family)
         if options.share_prefix:
             model = TransformersModel(name, loaded, options)
         else:
@@ -208,6 +207,15 @@ class HfVlm:
         if named is not None and named.model_types:
             require_model_type(located, named.model_types)
         return located
+
+
+def find_family(located: LocatedCheckpoint[Any]) -> tuple[MakeFamily, Any]:
+    """Return the family of a checkpoint, and its processor if there is no code for it."""
+    family = family_of(located.config)
+    if family is not None:
+        return family, None
+    processor = load_processor(located)
+    return partial(ProcessorFamily, processor=processor), processor
 
 
 def family_of(config: Any) -> MakeFamily | None:

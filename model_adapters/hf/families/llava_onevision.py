@@ -33,13 +33,9 @@ class LlavaOnevisionFamily(PlainFamily):
 
     def features_of(self, frames: Sequence[Pixels]) -> list[torch.Tensor]:
         """Return each frame's packed features, (tokens, hidden): overview, patches, row breaks."""
-        features = []
+        features: list[torch.Tensor] = []
         for _, alike in groupby(frames, lambda frame: frame["pixel_values"].shape):
-            inputs = self._inputs(list(alike))
-            output = self._model.get_image_features(
-                inputs["pixel_values"], inputs["image_sizes"], return_dict=True
-            )
-            features.extend(output.pooler_output)
+            features += self._encoded(list(alike), "pixel_values", "image_sizes")
         return features
 
 

@@ -42,13 +42,9 @@ class PixtralFamily(PlainFamily):
         Frames are encoded one by one: the vision tower joins a batch to one sequence with a mask
         over all pairs of patches, so the cost would be quadratic in the number of frames.
         """
-        features = []
+        features: list[torch.Tensor] = []
         for frame in frames:
-            inputs = self._inputs([frame])
-            output = self._model.get_image_features(
-                inputs["pixel_values"], image_sizes=inputs["image_sizes"], return_dict=True
-            )
-            features.extend(output.pooler_output)
+            features += self._encoded([frame], "pixel_values", "image_sizes")
         return features
 
 

@@ -60,6 +60,13 @@ class PlainFamily:
         """Return consecutive positions, (1, tokens)."""
         return torch.arange(start, start + len(ids), device=ids.device)[None]
 
+    def _encoded(self, frames: Sequence[Pixels], *names: str) -> list[torch.Tensor]:
+        """Return what the model makes of these inputs of prepared frames, encoded together."""
+        inputs = self._inputs(frames)
+        chosen = {name: inputs[name] for name in names}
+        output = self._model.model.get_image_features(**chosen, return_dict=True)
+        return list(output.pooler_output)
+
     def _inputs(self, frames: Sequence[Pixels]) -> Pixels:
         """Return prepared frames as one input on the model's device, pixels in the model's type."""
         inputs = {name: torch.cat([frame[name] for frame in frames]) for name in frames[0]}

@@ -54,11 +54,7 @@ class Qwen25VLFamily(PlainFamily):
 
     def features_of(self, frames: Sequence[Pixels]) -> list[torch.Tensor]:
         """Return the vision tower's merged patches of each frame, (tokens, hidden)."""
-        inputs = self._inputs(frames)
-        output = self._model.get_image_features(
-            inputs["pixel_values"], inputs["image_grid_thw"], return_dict=True
-        )
-        return list(output.pooler_output)
+        return self._encoded(frames, "pixel_values", "image_grid_thw")
 
     def positions(self, ids: torch.Tensor, shapes: Sequence[Shape], start: int) -> torch.Tensor:
         """Return temporal, height and width positions, (3, 1, tokens).
@@ -118,12 +114,8 @@ class Qwen25VL(CheckpointAdapter):
     model_types = ("qwen2_5_vl",)
 
 
-class Qwen25VLNano(CheckpointAdapter):
+class Qwen25VLNano(Qwen25VL):
     """The adapter `qwen2.5-vl-nano`."""
-
-    Options = PixelOptions
-    family = Qwen25VLFamily
-    model_types = ("qwen2_5_vl",)
 
     @classmethod
     def build(cls, name: str, options: CheckpointOptions, seed: int) -> TransformersModel:

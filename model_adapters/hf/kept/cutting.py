@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pkgutil import resolve_name
 from statistics import fmean
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import torch
 from torch import Tensor
@@ -79,6 +79,7 @@ class CutPrefix:
     """What is kept of a sequence, in place of its `Prefix` for what follows.
 
     Attributes:
+        model, embed, chunk_tokens: those of the sequence.
         cache: the keys and values that are kept.
         kept: how much that is.
         sparse: None: what follows sees all of it.
@@ -87,8 +88,12 @@ class CutPrefix:
     sparse = None
 
     @torch.inference_mode()
-    def __init__(self, config: Any, view: CacheView, cut: CacheCut, end: int) -> None:
-        """Cut what a view shows; `end` is the position of the next token."""
+    def __init__(self, prefix: Prefix, view: CacheView, cut: CacheCut, end: int) -> None:
+        """Cut what a view shows of a sequence; `end` is the position of the next token."""
+        self.model = prefix.model
+        self.embed = prefix.embed
+        self.chunk_tokens = prefix.chunk_tokens
+        config = prefix.model.get_decoder().config
         method = method_of(cut)
         self.cache = BufferedCache(config)
         self._end = end
@@ -147,7 +152,7 @@ class CutPrefix:
 
 
 @torch.inference_mode()
-def attention_of(prefix: Prefix, config: Any, pieces: Sequence[Piece]) -> list[Tensor]:
+def attention_of(prefix: Prefix, pieces: Sequence[Piece]) -> list[Tensor]:
     """Return how much pieces behind a frame attend to a sequence before it, by layer: (key heads,
     tokens), the mean of pieces and of heads that share a key head.
 
@@ -155,9 +160,9 @@ def attention_of(prefix: Prefix, config: Any, pieces: Sequence[Piece]) -> list[T
 
     Args:
         prefix: the sequence.
-        config: config of the decoder.
         pieces: the frame, and what is asked behind it.
     """
+    config = prefix.model.get_decoder().config
     n_before, n_pieces = prefix.n_tokens, prefix.n_pieces
     prefix.feed(pieces[:1])
     found: list[list[Tensor]] = [[] for _ in range(config.num_hidden_layers)]

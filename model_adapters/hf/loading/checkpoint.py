@@ -232,26 +232,19 @@ def resolve_device(options: Placement) -> torch.device:
     name = options.device
     if name == "auto":
         name = "cuda" if torch.cuda.is_available() else "cpu"
-    with wrap_errors(
-        f"device={name} is not a torch device",
-        "use cpu, cuda, cuda:1, ...",
-        catch=RuntimeError,
-        raise_as=UsageError,
-    ):
+    problem = f"device={name} is not a torch device"
+    hint = "use cpu, cuda, cuda:1, ..."
+    with wrap_errors(problem, hint, catch=RuntimeError, raise_as=UsageError):
         device = torch.device(name)
     if device.type == "meta":
-        raise UsageError(f"device={name} computes nothing; use cpu, cuda, cuda:1, ...")
+        raise UsageError(f"device={name} computes nothing; {hint}")
     if device.type == "cuda" and not torch.cuda.is_available():
         raise ModelError(
             f"device={name}: torch {torch.__version__} finds no GPU here; use device=cpu"
         )
     # Each back end raises its own error if it is missing.
-    with wrap_errors(
-        f"device={name}: torch {torch.__version__} has none here",
-        "use cpu",
-        catch=Exception,
-        raise_as=ModelError,
-    ):
+    problem = f"device={name}: torch {torch.__version__} has none here"
+    with wrap_errors(problem, "use cpu", catch=Exception, raise_as=ModelError):
         torch.empty(1, device=device)
     return device
 

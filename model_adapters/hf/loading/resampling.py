@@ -35,19 +35,14 @@ def find_resize(image: Pixels, resized: Pixels, resample: int | None) -> Resize 
         return lambda pixels: pixels.copy(order="K")
     height, width = resized.shape[1:]
     filters = FILTERS if resample is None else (resample,)
-    orders = (True, False) if _changes_both(image, resized) else (True,)
+    changes_both = image.shape[1] != height and image.shape[2] != width
+    orders = (True, False) if changes_both else (True,)
     for chosen in filters:
         for columns_first in orders:
             resize = _resize(image.shape, height, width, chosen, columns_first)
             if np.array_equal(resize(image), resized):
                 return resize
     return None
-
-
-def _changes_both(image: Pixels, resized: Pixels) -> bool:
-    return all(
-        before != now for before, now in zip(image.shape[1:], resized.shape[1:], strict=True)
-    )
 
 
 def _resize(

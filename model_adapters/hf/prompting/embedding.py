@@ -39,7 +39,8 @@ class Span:
 class Embed(ABC):
     """Prepares spans of prompts for one model, with a cache of features of frames and clips."""
 
-    def __init__(self, model: Any, features: FeatureCache[Any]) -> None:
+    def __init__(self, model: Any, family: Family, features: FeatureCache[Any]) -> None:
+        self._family = family
         self._features = features
         self._embeddings = model.get_input_embeddings()
 
@@ -122,10 +123,6 @@ def word_span(
 
 class Embedder(Embed):
     """Embeds spans of prompts: what the language model reads are embeddings."""
-
-    def __init__(self, model: Any, family: Family, features: FeatureCache[torch.Tensor]) -> None:
-        super().__init__(model, features)
-        self._family = family
 
     @property
     def sees_ahead(self) -> bool:

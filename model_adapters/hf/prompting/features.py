@@ -2,6 +2,7 @@
 
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Generic, Protocol, Self, TypeVar
 
 import torch
@@ -23,27 +24,23 @@ _FilmedClip = tuple[ClipShape, Pixels]
 T = TypeVar("T", bound=_Kept)
 
 
+@dataclass(eq=False)
 class FeatureCache(Generic[T]):
     """Features by the content of a frame or a clip; the least recently used are dropped first.
 
-    Args:
+    Attributes:
         pixels: reads and scales frames and clips.
-        compute: returns the features of frames.
+        compute_frames: returns the features of frames.
         max_bytes: most bytes that are cached; 0 caches none.
         compute_clips: returns the features of clips, for families with a video input.
     """
 
-    def __init__(
-        self,
-        pixels: PixelsAhead,
-        compute: Callable[[Sequence[Pixels]], list[T]],
-        max_bytes: int,
-        compute_clips: Callable[[Sequence[_FilmedClip]], list[T]] | None = None,
-    ) -> None:
-        self._pixels = pixels
-        self._compute_frames = compute
-        self._compute_clips = compute_clips
-        self._max_bytes = max_bytes
+    pixels: PixelsAhead
+    compute_frames: Callable[[Sequence[Pixels]], list[T]]
+    max_bytes: int
+    compute_clips: Callable[[Sequence[_FilmedClip]], list[T]] | None = None
+
+    def __post_init__(self) -> None:
         self._bytes = 0
         self._cache: OrderedDict[Frame | Clip, T] = OrderedDict()
 
@@ -60,11 +57,11 @@ class FeatureCache(Generic[T]):
 
     def expect(self, pieces: Sequence[Frame | Clip]) -> None:
         """Begin to read those pieces that are going to be asked for and are not cached."""
-        self._pixels.expect([piece for piece in pieces if piece not in self._cache])
+        self.pixels.expect([piece for piece in pieces if piece not in self._cache])
 
     def hash(self, pieces: Sequence[Frame | Clip]) -> str:
         """Return the hash of the pixels of pieces whose features were asked for."""
-        return hash_frames(self._pixels.hashes[piece] for piece in pieces)
+        return hash_frames(self.pixels.hashes[piece] for piece in pieces)
 
     def clear(self) -> None:
         """Drop all features."""
@@ -73,18 +70,18 @@ class FeatureCache(Generic[T]):
 
     def close(self) -> None:
         """End the threads that read frames."""
-        self._pixels.close()
+        self.pixels.close()
 
     def _compute(self, pieces: Sequence[Frame | Clip]) -> dict[Frame | Clip, T]:
         frames = [piece for piece in pieces if isinstance(piece, Frame)]
         clips = [piece for piece in pieces if isinstance(piece, Clip)]
         features: dict[Frame | Clip, T] = {}
         if frames:
-            pixels = [self._pixels.take(frame) for frame in frames]
-            features |= zip(frames, self._compute_frames(pixels), strict=True)
-        if clips and self._compute_clips is not None:
-            videos = [(clip.shape, self._pixels.take(clip)) for clip in clips]
-            features |= zip(clips, self._compute_clips(videos), strict=True)
+            pixels = [self.pixels.take(frame) for frame in frames]
+            features |= zip(frames, self.compute_frames(pixels), strict=True)
+        if clips and self.compute_clips is not None:
+            videos = [(clip.shape, self.pixels.take(clip)) for clip in clips]
+            features |= zip(clips, self.compute_clips(videos), strict=True)
         return features
 
     def _store(self, features: dict[Frame | Clip, T]) -> None:
@@ -92,8 +89,8 @@ class FeatureCache(Generic[T]):
             if piece not in self._cache:
                 # A slice of a batch would keep the whole batch's memory as long as one of its
                 # frames is cached.
-                self._cache[piece] = tensor.clone() if self._max_bytes else tensor
+                self._cache[piece] = tensor.clone() if self.max_bytes else tensor
                 self._bytes += tensor.nbytes
             self._cache.move_to_end(piece)
-        while self._bytes > self._max_bytes:
+        while self._bytes > self.max_bytes:
             self._bytes -= self._cache.popitem(last=False)[1].nbytes

@@ -13,7 +13,6 @@ import torch
 
 from model_adapters.hf.family import Family, Pixels
 from model_adapters.hf.prompting.embedding import Embed, Span, piece_starts, word_span
-from model_adapters.hf.prompting.features import FeatureCache
 from model_adapters.hf.prompting.prompt import Frame, Piece, token_ids
 
 # Outputs of vision encoders that are not for the language model, if `pooler_output` is there.
@@ -99,11 +98,7 @@ class MergingFamily(Family, Protocol):
 class NativeEmbedder(Embed):
     """Prepares spans of prompts as the model's own inputs."""
 
-    def __init__(
-        self, model: Any, family: MergingFamily, features: FeatureCache[EncodedImage]
-    ) -> None:
-        super().__init__(model, features)
-        self._family = family
+    _family: MergingFamily
 
     @property
     def sees_ahead(self) -> bool:

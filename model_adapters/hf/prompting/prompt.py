@@ -117,14 +117,9 @@ class Prompter:
         self._tokenizer = tokenizer
         self._template = template
         self._family = family
-        video = (
-            None
-            if family.video is None
-            else tokenizer.convert_ids_to_tokens(family.video.placeholder_id)
-        )
-        image = (
-            tokenizer.convert_ids_to_tokens(family.placeholder_id) if self.takes_frames else None
-        )
+        text_of = tokenizer.convert_ids_to_tokens
+        video = None if family.video is None else text_of(family.video.placeholder_id)
+        image = text_of(family.placeholder_id) if self.takes_frames else None
         self._marks = Marks(image, video)
         self._frames: dict[str, Frame] = {}
         self._ids: dict[Size, tuple[int, ...]] = {}

@@ -174,11 +174,10 @@ def _apply(
     # memory.
     seconds = TEMPLATE_SECONDS.value
     late = f"{problem} (it is not done after {seconds} s); fix it; {TEMPLATE_SECONDS.hint}"
+    smaller = f"fix it; {TEMPLATE_MB.hint}"
     with (
         limit_time(seconds, ModelError(late)),
-        wrap_errors(
-            problem, f"fix it; {TEMPLATE_MB.hint}", catch=_OutOfMemoryError, raise_as=ModelError
-        ),
+        wrap_errors(problem, smaller, catch=_OutOfMemoryError, raise_as=ModelError),
         wrap_errors(problem, "use other turns, or fix it", catch=_REFUSALS, raise_as=ModelError),
         _limit_memory(TEMPLATE_MB.value),
     ):

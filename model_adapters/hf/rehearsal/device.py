@@ -9,7 +9,7 @@ Memory that a kernel takes within one operation is not seen, but for attention (
 
 import weakref
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from math import prod
 from typing import Any
 
@@ -48,9 +48,7 @@ class ShapesDevice:
     @contextmanager
     def running(self) -> Iterator[None]:
         """Run what is called within the context on the device, where it names it."""
-        with ExitStack() as stack:
-            stack.enter_context(_Functions(self))
-            stack.enter_context(_Operations(self))
+        with _Functions(self), _Operations(self):
             yield
 
     def reset_peak(self) -> None:

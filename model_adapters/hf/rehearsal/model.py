@@ -22,7 +22,7 @@ from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.formats.yaml_files import read_yaml
 from infthor_eval.storage.scratch import ScratchFolder
 from model_adapters.hf.families.hf_lm import TextFamily
-from model_adapters.hf.families.hf_vlm import HfVlm, ProcessorFamily, family_of
+from model_adapters.hf.families.hf_vlm import HfVlm, find_family
 from model_adapters.hf.family import Family
 from model_adapters.hf.loading.checkpoint import (
     LocatedCheckpoint,
@@ -30,7 +30,6 @@ from model_adapters.hf.loading.checkpoint import (
     read_checkpoint,
     resolve_dtype,
 )
-from model_adapters.hf.loading.processors import load_processor
 from model_adapters.hf.loading.rope import apply_rope
 from model_adapters.hf.rehearsal.device import ShapesDevice
 from model_adapters.hf.uncached import expand_image_tokens
@@ -91,24 +90,18 @@ def load_shapes(options: CheckpointOptions) -> RehearsedModel:
 
 def _refuse_options(options: CheckpointOptions) -> None:
     for name in ("kv_offload", "quantization", "attention"):
-        if not getattr(options, name):
-            continue
-        raise UsageError(
-            f"{name} cannot be rehearsed: memory would be counted wrongly; leave it out"
-        )
+        if getattr(options, name):
+            raise UsageError(
+                f"{name} cannot be rehearsed: memory would be counted wrongly; leave it out"
+            )
 
 
 def _load(options: CheckpointOptions, source: str) -> RehearsedModel:
     located = HfVlm.locate("hf-vlm", options)
     device = ShapesDevice()
     build = partial(_build, device=device)
-    family = family_of(located.config)
-    process: Callable[[Sequence[Image.Image]], Any] | None = None
     try:
-        if family is None:
-            processor = load_processor(located)
-            family = partial(ProcessorFamily, processor=processor)
-            process = partial(expand_image_tokens, processor)
+        family, processor = find_family(located)
         loaded = read_checkpoint(located, family, build)
     except ModelError as error:
         limit = apply_rope(located.config, options.rope)
@@ -118,7 +111,8 @@ def _load(options: CheckpointOptions, source: str) -> RehearsedModel:
         return RehearsedModel(
             model, text, options, device, device.allocated, source, limit, problem=str(error)
         )
-    if process is None:
+    process: Callable[[Sequence[Image.Image]], Any] = partial(expand_image_tokens, processor)
+    if processor is None:
         process = partial(loaded.image_processor, return_tensors="pt")
     weights = device.allocated
     return RehearsedModel(

@@ -7,7 +7,7 @@ allocated at a time is the memory of the context.
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -133,8 +133,13 @@ class Rehearsal:
     @property
     def flash_problem(self) -> str:
         """Why the decoder cannot attend by flash-attn; empty if it can."""
-        heads = {call.head_size for call in self._probe}
-        return _flash_problem(self._rehearsed.model, max(heads), self._embed.sees_ahead)
+        if not getattr(self._rehearsed.model, "_supports_flash_attn", False):
+            return "the model's code does not support it"
+        largest = max(call.head_size for call in self._probe)
+        if largest > _LARGEST_HEAD:
+            return f"heads of {largest} are larger than {_LARGEST_HEAD}"
+        sees_ahead = self._embed.sees_ahead
+        return "it cannot attend in both directions over a frame" if sees_ahead else ""
 
     def usage(self, n_context: int) -> Usage:
         """Return the memory of a context of so many tokens."""
@@ -190,17 +195,15 @@ class Rehearsal:
     @contextmanager
     def _running(self) -> Iterator[None]:
         model = self._rehearsed.model
-        with ExitStack() as stack:
-            stack.enter_context(torch.inference_mode())
-            if self._flash:
-                decoder = model.get_decoder().config
-                stack.enter_context(_flash_attention(decoder, self._device))
+        decoder = model.get_decoder().config
+        problem = f"{model.config.model_type} cannot be rehearsed"
+        with (
+            torch.inference_mode(),
+            _flash_attention(decoder, self._device) if self._flash else nullcontext(),
             # Any error is possible: code that needs numbers finds none.
-            problem = f"{model.config.model_type} cannot be rehearsed"
-            stack.enter_context(
-                wrap_errors(problem, "measure on a GPU", catch=Exception, raise_as=ModelError)
-            )
-            stack.enter_context(self._device.running())
+            wrap_errors(problem, "measure on a GPU", catch=Exception, raise_as=ModelError),
+            self._device.running(),
+        ):
             yield
 
     def _frame(self, number: int) -> list[Piece]:
@@ -263,45 +266,17 @@ class Rehearsal:
         }
 
     def _attention(self, run: Callable[[], Any]) -> Kernels:
-        """Return the calls of attention to the whole context."""
+        """Return the calls of attention to more than half of the context."""
         self._device.attention.clear()
         run()
-        return _counted(self._device.attention, self._prefix.n_tokens)
+        half = self._prefix.n_tokens // 2
+        calls = [call for call in self._device.attention if call.n_keys > half]
+        return Counter((call.kernel, call.has_mask, call.head_size) for call in calls)
 
     def _answer_together(self) -> None:
         """Encode questions together, as many as a trajectory of the published set has at most."""
-        options = self._rehearsed.options
-        encode_together(
-            self._rehearsed.model,
-            self._embed,
-            prefix=self._prefix,
-            continuations=[[_TOKEN] * _QUESTION] * min(options.batch_size, _TOGETHER),
-            chunk_tokens=self._chunk_tokens,
-        )
-
-
-def _counted(calls: Sequence[Attention], n_context: int) -> Kernels:
-    """Return the calls that attend to more than half of a context."""
-    return Counter(
-        (call.kernel, call.has_mask, call.head_size)
-        for call in calls
-        if call.n_keys > n_context // 2
-    )
-
-
-def _flash_problem(model: Any, largest_head: int, sees_ahead: bool) -> str:
-    """Return why a model cannot run with flash-attn; empty if it can.
-
-    Args:
-        model: the transformers model.
-        largest_head: numbers of its largest head.
-        sees_ahead: whether tokens of a frame attend to later ones of it.
-    """
-    if not getattr(model, "_supports_flash_attn", False):
-        return "the model's code does not support it"
-    if largest_head > _LARGEST_HEAD:
-        return f"heads of {largest_head} are larger than {_LARGEST_HEAD}"
-    return "it cannot attend in both directions over a frame" if sees_ahead else ""
+        n_questions = min(self._rehearsed.options.batch_size, _TOGETHER)
+        encode_together(self._prefix, [[_TOKEN] * _QUESTION] * n_questions)
 
 
 @contextmanager

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import KW_ONLY, dataclass
 from functools import partial
 from typing import Any
 
@@ -16,38 +17,34 @@ from model_adapters.hf.sparse.layout import Layout
 from model_adapters.hf.sparse.window import WindowAttention
 
 
+@dataclass(eq=False)
 class SparseReading:
     """How a sequence is read: which tokens see which, and what its cache need not keep.
 
-    Args:
+    Attributes:
         config: config of the decoder.
         rule: which tokens see which.
         device: device of the decoder's inputs.
         by_frames: True if frames are seen, or not, as a whole.
     """
 
-    def __init__(
-        self,
-        config: Any,
-        rule: WindowAttention | ChosenAttention,
-        device: torch.device,
-        *,
-        by_frames: bool,
-    ) -> None:
-        self._config = config
-        self._rule = rule
-        self._by_frames = by_frames
-        self._device = device
+    config: Any
+    rule: WindowAttention | ChosenAttention
+    device: torch.device
+    _: KW_ONLY
+    by_frames: bool
+
+    def __post_init__(self) -> None:
         self.reset()
 
     def reset(self) -> None:
         """Begin a sequence."""
-        self.layout = Layout.empty(self._device)
+        self.layout = Layout.empty(self.device)
 
     @property
     def window(self) -> WindowAttention | None:
         """The rule, if it is one of all tokens, of replies too."""
-        return self._rule if isinstance(self._rule, WindowAttention) else None
+        return self.rule if isinstance(self.rule, WindowAttention) else None
 
     @property
     def goes_by_chunks(self) -> bool:
@@ -94,13 +91,13 @@ class SparseReading:
         Raises:
             CannotAttendError: the decoder attends in another way; see `attending`.
         """
-        self.layout += Layout.of(pieces, start, positions, by_frames=self._by_frames)
+        self.layout += Layout.of(pieces, start, positions, by_frames=self.by_frames)
         if is_asked and self.goes_by_chunks:
             yield
             return
 
         def plan(mask_function: MaskFunction, _local_size: int | None) -> Plan:
-            return self._rule.plan(self.layout, n_tokens(pieces), partial(seen_by, mask_function))
+            return self.rule.plan(self.layout, n_tokens(pieces), partial(seen_by, mask_function))
 
-        with attending(self._config, self._device, plan, "leave attention out"):
+        with attending(self.config, self.device, plan, "leave attention out"):
             yield

@@ -40,7 +40,8 @@ class WindowAttention:
 
     def n_unseen(self, layout: Layout, number: int) -> int:
         """Return how many tokens behind the first ones no token from a number on sees."""
-        return int(((number - layout.first >= self.shape.window) & self._is_no_sink(layout)).sum())
+        is_out = number - layout.first >= self.shape.window
+        return int((is_out & (layout.last >= self.shape.sinks)).sum())
 
     def first_seen(self, layout: Layout) -> int:
         """Return behind how many tokens a sequence can be cut, at least, so that later ones see
@@ -114,9 +115,6 @@ class WindowAttention:
     def _near(self, rows: Layout, columns: Layout) -> Tensor:
         distance = rows.number[:, None] - columns.first
         return (distance < self.shape.window) | (columns.first == rows.first[:, None])
-
-    def _is_no_sink(self, layout: Layout) -> Tensor:
-        return layout.last >= self.shape.sinks
 
 
 def _joined(n_first: int, begin: int, end: int, device: torch.device) -> slice | Tensor:

@@ -10,7 +10,7 @@ import json
 import time
 import urllib.error
 import urllib.request
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -32,7 +32,9 @@ _QUOTED = 200  # characters of a server's text in a message
 
 
 class HttpPolicy:
-    """A policy behind a server."""
+    """The adapter `vla-http`: a policy behind a server."""
+
+    Options: ClassVar[type] = VlaHttpOptions
 
     def __init__(self, name: str, options: VlaHttpOptions) -> None:
         self.name = name
@@ -42,6 +44,11 @@ class HttpPolicy:
         base = self._url.removesuffix("/act")
         self._resets = _JsonClient(base + options.reset, options) if options.reset else None
         self._begins = False
+
+    @classmethod
+    def build(cls, name: str, options: VlaHttpOptions, seed: int) -> Self:  # noqa: ARG003
+        """Build the client; the first request is sent by `act`."""
+        return cls(name, options)
 
     @property
     def capabilities(self) -> Capabilities:
@@ -88,17 +95,6 @@ class HttpPolicy:
 
     def close(self) -> None:
         """Do nothing: no connection is kept open."""
-
-
-class VlaHttp:
-    """The adapter `vla-http`."""
-
-    Options: ClassVar[type] = VlaHttpOptions
-
-    @classmethod
-    def build(cls, name: str, options: VlaHttpOptions, seed: int) -> HttpPolicy:  # noqa: ARG003
-        """Build the client; the first request is sent by `act`."""
-        return HttpPolicy(name, options)
 
 
 def encode_array(array: npt.NDArray[Any]) -> dict[str, Any]:
@@ -180,17 +176,17 @@ class _JsonClient:
 
     def send(self, content: object) -> bytes:
         """Return the server's reply to a POST request, whatever it is."""
-        return self._send(json.dumps(content).encode())
-
-    def _send(self, body: bytes) -> bytes:
         # Only a failed connection is retried: an error status would come again, and a late reply
         # may still be computed.
+        body = json.dumps(content).encode()
         reason: Exception | None = None
         for attempt in range(self._retries + 1):
             if attempt:
                 time.sleep(_FIRST_WAIT_S * 2 ** (attempt - 1))
             try:
-                return self._send_once(body)
+                # Of the whole request: a socket's timeout begins again with each byte that arrives.
+                with limit_time(self._timeout_s, self._timeout_error()):
+                    return self._exchange(body)
             except (urllib.error.URLError, ConnectionError, http.client.HTTPException) as error:
                 reason = error
         cause = in_one_line(getattr(reason, "reason", None) or reason or ConnectionError())
@@ -198,11 +194,6 @@ class _JsonClient:
             f"{self._url} cannot be reached in {self._retries + 1} attempts ({cause}); is the "
             "server up?"
         )
-
-    def _send_once(self, body: bytes) -> bytes:
-        # Of the whole request: a socket's timeout begins again with each byte that arrives.
-        with limit_time(self._timeout_s, self._timeout_error()):
-            return self._exchange(body)
 
     def _exchange(self, body: bytes) -> bytes:
         request = urllib.request.Request(self._url, body, {"Content-Type": "application/json"})
@@ -213,12 +204,10 @@ class _JsonClient:
             with error:
                 text = _quote(error.read(_QUOTED))
             raise ModelError(f"{self._url} answers {error.code} {error.reason}: {text}") from error
-        except urllib.error.URLError as error:
-            if isinstance(error.reason, TimeoutError):
+        except (urllib.error.URLError, TimeoutError) as error:
+            if isinstance(getattr(error, "reason", error), TimeoutError):
                 raise self._timeout_error() from error
             raise
-        except TimeoutError as error:
-            raise self._timeout_error() from error
 
     def _read(self, reply: http.client.HTTPResponse) -> bytes:
         """Read the whole reply."""

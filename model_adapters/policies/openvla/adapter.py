@@ -67,14 +67,7 @@ def load_openvla(
         with empty_parameters():
             weights = OpenVLAWeights(towers, size, config.language(options.attn_implementation))
         layout = weights_layout(weights, towers)
-        load_weights(
-            weights,
-            checkpoint.folder,
-            layout,
-            pretrained=checkpoint.pretrained,
-            device=device,
-            dtype=dtype,
-        )
+        load_weights(weights, checkpoint, layout, device, dtype)
     network = OpenVLANetwork(weights.eval(), description.tokenizer, description.bins, size)
     identity = checkpoint.identity(device, dtype, options) | {"unnorm_key": description.key}
     crop = size if options.center_crop else None

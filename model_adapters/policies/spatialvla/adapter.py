@@ -40,14 +40,7 @@ def load_spatialvla(
         view = _view(config, processor, key, options, pretrained)
         with empty_parameters():
             weights = SpatialVLAWeights(config, options.attn_implementation)
-        load_weights(
-            weights,
-            checkpoint.folder,
-            weights.layout(),
-            pretrained=pretrained,
-            device=device,
-            dtype=dtype,
-        )
+        load_weights(weights, checkpoint, weights.layout(), device, dtype)
         weights.place_action_embeddings()
     network = SpatialVLANetwork(
         weights.eval(), tokenizer, bins, processor.action_chunk_size, config.image_token_index, view

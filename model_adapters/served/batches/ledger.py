@@ -4,11 +4,12 @@ import os
 import secrets
 import time
 from collections.abc import Iterable, Sequence
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 import msgspec
 
-from infthor_eval.errors import DataError, in_one_line, wrap_errors
+from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.storage.files import remove, write_atomically, writing_hint
 from model_adapters.served.batches.service import Batch, BatchReply
 
@@ -77,16 +78,12 @@ class Ledger:
         """Return the replies of a batch that has ended."""
         path = self._folder / f"{batch.name}{_REPLIES}"
         decode = msgspec.json.Decoder(BatchReply).decode
-        try:
+        with _wrap_reading(path):
             return [decode(line) for line in path.read_bytes().splitlines()]
-        except (OSError, msgspec.DecodeError) as error:
-            raise _unreadable(path, error) from error
 
     def _read(self, path: Path) -> Batch:
-        try:
+        with _wrap_reading(path):
             batch = msgspec.json.decode(path.read_bytes(), type=Batch)
-        except (OSError, msgspec.DecodeError) as error:
-            raise _unreadable(path, error) from error
         if batch.name != path.name.removesuffix(_BATCH):
             raise DataError(f"{path}: is of the batch {batch.name!r:.40}; rename it")
         return batch
@@ -106,8 +103,6 @@ class Ledger:
             os.fsync(file.fileno())
 
 
-def _unreadable(path: Path, error: Exception) -> DataError:
-    return DataError(
-        f"{path}: cannot be read ({in_one_line(error)}); put it back, or start again with --fresh, "
-        "which asks and pays again"
-    )
+def _wrap_reading(path: Path) -> AbstractContextManager[None]:
+    hint = "put it back, or start again with --fresh, which asks and pays again"
+    return wrap_errors(f"{path}: cannot be read", hint, catch=(OSError, msgspec.DecodeError))

@@ -3,7 +3,7 @@
 import os
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from threading import Lock
@@ -391,8 +391,6 @@ class BatchQueue:
                 "fetches their replies"
             )
 
-    @contextmanager
-    def _writes(self) -> Iterator[None]:
+    def _writes(self) -> AbstractContextManager[None]:
         hint = writing_hint(" and run the same command again, which resumes it")
-        with wrap_errors("the requests of a batch cannot be written", hint):
-            yield
+        return wrap_errors("the requests of a batch cannot be written", hint)

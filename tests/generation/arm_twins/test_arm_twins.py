@@ -1,6 +1,5 @@
 """Arm twins: what they are, and what an arm makes of them that knows, guesses, or remembers."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,7 +12,7 @@ from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.trajectory import encode_trajectory, iter_trajectories
 from infthor_eval.formats.twins import read_pairs
 from infthor_eval.manipulation import actors
-from infthor_eval.manipulation.actors import PlannerArm, _PlannerActor
+from infthor_eval.manipulation.actors import PlannerArm
 from infthor_eval.manipulation.trajectories import choice_episodes
 from infthor_eval.run import open_runs
 from model_adapters import Capabilities
@@ -98,27 +97,22 @@ def cheat(run, monkeypatch):
     it took and by what it chose, and how episodes ended."""
 
     def cheat(rule):
-        monkeypatch.setattr(_Cheating, "rule", staticmethod(rule), raising=False)
-        monkeypatch.setattr(PlannerArm, "_actor", _Cheating)
+        plan = PlannerArm._steps
+
+        def steps(situation):
+            environment = situation.environment
+            if rule(situation):
+                other = environment.episode.choice.other
+                environment.start = replace(environment.start, object_id=other)
+            return plan(situation)
+
+        monkeypatch.setattr(PlannerArm, "_steps", staticmethod(steps))
         opened = run("planner-arm")
         found = opened.summary.summary.tasks[TASK].choices
         ended = [record.payload.ended for record in opened.records]
         return found.net_pairs.mean, found.chosen.mean, ended
 
     return cheat
-
-
-class _Cheating(_PlannerActor):
-    """The planner, which goes to the thing that a rule says."""
-
-    rule: Callable[[object], bool]
-
-    def begin(self, situation):
-        environment = situation.environment
-        if type(self).rule(situation):
-            other = environment.episode.choice.other
-            environment.start = replace(environment.start, object_id=other)
-        super().begin(situation)
 
 
 def test_a_planner_has_what_its_knowledge_is_worth(cheat):

@@ -113,7 +113,7 @@ def test_on_two_devices_replies_are_the_same(family, batch_size, tiny_family, fr
     _spread(model, seen)
     with elsewhere(seen):
         assert _asked(model, frames[:2]) == here
-    kept = {layer.keys.device for layer in model._prefix._cache.layers if hasattr(layer, "keys")}
+    kept = {layer.keys.device for layer in model._prefix.cache.layers if hasattr(layer, "keys")}
     # Gemma 4's later layers attend to the keys of earlier ones.
     assert SECOND in kept or family == "gemma4"
 
@@ -141,7 +141,7 @@ def test_no_room_for_the_embeddings_is_one_line(tiny_family):
 def test_half_precision_answers_the_same_every_time(family, tiny_family, frames):
     model = _load(tiny_family(family), dtype="bfloat16")
     first = _asked(model, frames[:2])
-    kept = {layer.keys.dtype for layer in model._prefix._cache.layers if hasattr(layer, "keys")}
+    kept = {layer.keys.dtype for layer in model._prefix.cache.layers if hasattr(layer, "keys")}
     assert kept == {torch.bfloat16}
     _forget(model)
     assert _asked(model, frames[:2]) == first

@@ -56,7 +56,7 @@ def test_half_precision_answers_the_same_every_time(family, mode, checkpoints, f
     assert torch.isfinite(model.encode(model.pieces(user(*frames[:2], QUESTIONS[0])))).all()
     _forget(model)
     first = _asked(model, frames[:2])
-    assert {layer.keys.dtype for layer in model._prefix._cache.layers} == {torch.bfloat16}
+    assert {layer.keys.dtype for layer in model._prefix.cache.layers} == {torch.bfloat16}
     assert len(set(first)) > 1
     assert _asked(model, frames[:2]) == first  # with the frames still encoded
     _forget(model)
@@ -80,7 +80,7 @@ def test_a_model_on_another_device_leaves_nothing_on_the_cpu(family, mode, frame
     move(model._loaded.model, seen)
     with elsewhere(seen):
         assert _asked(model, frames[:2]) == here
-    kept = {layer.keys.device.type for layer in model._prefix._cache.layers}
+    kept = {layer.keys.device.type for layer in model._prefix.cache.layers}
     assert kept == {"cpu" if mode == "offloaded" else "meta"}
     assert seen.brought.total() > 0
 

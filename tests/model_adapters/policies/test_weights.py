@@ -6,6 +6,7 @@ from safetensors.torch import save_file
 from torch import nn
 
 from infthor_eval.errors import ModelError
+from model_adapters.policies.checkpoint import PolicyCheckpoint
 from model_adapters.policies.weights import Layout, empty_parameters, load_weights
 
 
@@ -31,7 +32,8 @@ def _loaded(folder, dtype=torch.float32):
     with empty_parameters():
         module = Small()
     layout = Layout.of(module, lambda name: name.replace("first", "old"), UNUSED)
-    load_weights(module, folder, layout, pretrained="mine", device=torch.device("cpu"), dtype=dtype)
+    checkpoint = PolicyCheckpoint(folder, "mine", {})
+    load_weights(module, checkpoint, layout, torch.device("cpu"), dtype)
     return module
 
 

@@ -167,14 +167,15 @@ def test_a_server_that_reads_nothing_is_not_waited_for(
         connection.recv_flow_control.release()
 
     policy = connect("vla-eval", websocket_server(deaf), timeout_s=0.4)
-    policy._here.session._socket.socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)
+    (session,) = policy._sessions.values()
+    session._socket.socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)
     noise = np.random.default_rng(0).integers(0, 256, (1000, 1000, 3), dtype=np.uint8)
     Image.fromarray(noise).save(tmp_path / "noise.png")
     large = replace(shot, image=FrameRef(tmp_path / "noise.png"))
     said = []
 
     def act():
-        policy._here.session = next(iter(policy._sessions))
+        policy._sessions[threading.get_ident()] = session
         said.append(refusal(run, policy, [large]))
 
     thread = threading.Thread(target=act)

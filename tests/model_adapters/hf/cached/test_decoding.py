@@ -3,8 +3,8 @@ import torch
 from transformers import GenerationConfig, TemperatureLogitsWarper, TopPLogitsWarper
 
 from infthor_eval.errors import ModelError
-from model_adapters.hf.cached.choices import Choices
 from model_adapters.hf.cached.decoding import (
+    Choices,
     Generation,
     ReplyState,
     decode_replies,
