@@ -136,7 +136,7 @@ def _prepare(options: Mapping[str, Any]) -> list[PreparedRun]:
         take_options(context, options, "evaluate")
         with context.scope(cleanup=False):
             command.parse_args(context, [])
-            requests = list(RunOptions.from_click(context.params).requests())
+            requests = RunOptions.from_click(context.params).requests()
     except click.ClickException as error:
         raise UsageError(error.format_message()) from error
     draw_missing(requests)

@@ -16,7 +16,6 @@ from infthor_eval.errors import DataError, unknown_name
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.report.descriptions import THOUGHT, Description, StepRow
 from infthor_eval.report.runs import choose_evenly
-from infthor_eval.report.web.thumbnails import ThumbnailStore
 from infthor_eval.run import Run, open_runs
 from infthor_eval.runs import StoredFrames, StoredRequest, UnitRecord
 
@@ -200,6 +199,9 @@ class Sample:
 
     def _pictures(self) -> tuple[Sequence[str], str]:
         """Return the frames as WebP in base64, and a note on those that are not there."""
+        # For notebooks alone: runs import this module before their first question.
+        from infthor_eval.report.web.thumbnails import ThumbnailStore
+
         store = ThumbnailStore(_ROOM, _SIDE)
         try:
             chosen = choose_evenly(self.frames, _MOST_FRAMES)

@@ -1,11 +1,13 @@
 """Which object each pixel of a frame shows."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
+
+from infthor_eval.errors import SimulatorError, wrap_errors
 
 
 @dataclass(frozen=True)
@@ -16,17 +18,25 @@ class Instance:
     box: tuple[int, int, int, int]
 
 
+class _Color(msgspec.Struct, frozen=True):
+    name: str
+    color: tuple[int, int, int]
+
+    @property
+    def code(self) -> int:
+        r, g, b = self.color
+        return r << 16 | g << 8 | b
+
+
 class Segmentation:
     """Which object each pixel of a frame shows; worked out when it is first asked for.
 
     Args:
         frame: the color of what each pixel shows, [height, width, 3].
-        colors: what has each color.
+        colors: AI2-THOR's `colors` in MessagePack: what has each color.
     """
 
-    def __init__(
-        self, frame: NDArray[np.uint8], colors: Mapping[tuple[int, int, int], str]
-    ) -> None:
+    def __init__(self, frame: NDArray[np.uint8], colors: msgspec.Raw) -> None:
         self._frame = frame
         self._colors = colors
 
@@ -43,10 +53,11 @@ class Segmentation:
     @cached_property
     def names(self) -> dict[int, str]:
         """Ids of objects by code; codes of walls and floors have none."""
+        hint = "use AI2-THOR 5.x"
+        with wrap_errors("colors of a reply", hint, catch=ValueError, raise_as=SimulatorError):
+            colors = msgspec.msgpack.decode(self._colors, type=list[_Color])
         # A name without "|" is a class of the structure, not an object.
-        return {
-            r << 16 | g << 8 | b: name for (r, g, b), name in self._colors.items() if "|" in name
-        }
+        return {it.code: it.name for it in colors if "|" in it.name}
 
     @cached_property
     def instances(self) -> dict[str, Instance]:

@@ -21,7 +21,7 @@ from typing import Any
 
 import msgspec
 from ai2thor.fifo_server import FieldType, FifoServer
-from ai2thor.server import DepthFormat, MultiAgentEvent
+from ai2thor.server import DepthFormat, MultiAgentEvent, read_buffer_image
 
 from infthor_eval.errors import SimulatorError
 from infthor_eval.storage.scratch import ScratchFolder
@@ -39,6 +39,8 @@ _NOT_PROTOCOL = (
     IndexError,
 )  # msgspec's errors are ValueErrors
 _decode = msgspec.msgpack.decode
+_IDS = "image_ids"
+_KEPT: dict[str, type] = {"objects": ReceivedObjects, "colors": msgspec.Raw}
 
 
 class PeerFault(SimulatorError):
@@ -50,7 +52,10 @@ class PeerFault(SimulatorError):
 
 
 class SafeFifoServer(FifoServer):
-    """A drop-in replacement of ai2thor's FIFO server.
+    """A drop-in replacement of ai2thor's FIFO server, whose events have no masks of objects.
+
+    Instead they have `colors`, those of what each pixel of `instance_segmentation_frame` shows, in
+    MessagePack: masks take a tenth of the time of a reply, and hardly anybody asks for them.
 
     Attributes:
         fault: the failure, after which the server cannot be used again; None before.
@@ -105,6 +110,18 @@ class SafeFifoServer(FifoServer):
         except _NOT_PROTOCOL as error:
             detail = " ".join(f"{type(error).__name__}: {error}".split())[:200]
             raise self._fail("garbage", f"sent what is not its protocol ({detail})") from error
+
+    def create_event(self, metadata: dict[str, Any], files: Any) -> Any:
+        """Return the event of a reply."""
+        agents = metadata["agents"]
+        plain = {**metadata, "agents": [{**agent, "colors": None} for agent in agents]}
+        reply = super().create_event(plain, {it: files[it] for it in files if it != _IDS})
+        for event, agent in zip(reply.events, agents, strict=True):
+            event.colors = agent.get("colors")
+        for event, ids in zip(reply.events, files.get(_IDS, ()), strict=False):
+            frame = read_buffer_image(ids, event.screen_width, event.screen_height)
+            event.instance_segmentation_frame = frame[:, :, :3]
+        return reply
 
     def send(self, action: dict[str, Any]) -> None:
         """Send one action; raises PeerFault if the simulator died or does not read."""
@@ -260,11 +277,8 @@ class SafeFifoServer(FifoServer):
 
 
 def _decoded(parts: dict[str, msgspec.Raw]) -> dict[str, Any]:
-    """Return the parts of a message decoded."""
-    return {
-        key: ReceivedObjects(raw) if key == "objects" else _decode(raw)
-        for key, raw in parts.items()
-    }
+    """Return the parts of a message decoded, but those that may not be asked for."""
+    return {key: _KEPT[key](raw) if key in _KEPT else _decode(raw) for key, raw in parts.items()}
 
 
 def _open_pipe(path: str, mode: int) -> io.FileIO:

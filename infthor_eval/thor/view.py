@@ -293,7 +293,7 @@ def view_of(event: Any) -> SimulatorView:
         error_code=str(outcome.code or ""),
         result=outcome.result,
         scene=outcome.scene,
-        segmentation=None if shown is None else Segmentation(shown, event.color_to_object_id),
+        segmentation=None if shown is None else Segmentation(shown, event.colors),
         arm=arm,
         camera=camera,
         image_digest=metadata.get("imageDigest"),

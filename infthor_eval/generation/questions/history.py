@@ -4,9 +4,11 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import chain
 
 from infthor_eval.errors import DataError
 from infthor_eval.formats.step_log import ObjectInFrame, ObjectState, Step, iter_object_states
+from infthor_eval.grouping import grouped
 from infthor_eval.household.containment import logged_parent
 from infthor_eval.household.wording import canonical_type
 
@@ -88,7 +90,8 @@ class TrajectoryHistory:
         self.min_pixels = share * _SIDE**2
         self._states = list(_snapshots(steps))
         self._parents = list(_parents(self._states))
-        self._contents: dict[tuple[int, str], frozenset[str]] = {}  # by map of parents
+        self._grouped: dict[int, dict[str, list[str]]] = {}  # by map of parents
+        self._contents: dict[tuple[int, str], frozenset[str]] = {}  # likewise
         self._shown: dict[int, dict[str, tuple[bool, int]]] = {}  # by frame
 
     def until(self, moment: int) -> "TrajectoryHistory":
@@ -98,6 +101,7 @@ class TrajectoryHistory:
         part.steps = self.steps[:end]
         part._states = self._states[:end]
         part._parents = self._parents[:end]
+        part._grouped = self._grouped
         part._contents = self._contents
         part._shown = self._shown
         return part
@@ -332,12 +336,17 @@ class TrajectoryHistory:
         parents = self._parents[frame]
         known = id(parents), receptacle
         if known not in self._contents:
-            self._contents[known] = frozenset(
-                key
-                for key, parent in parents.items()
-                if parent is not None and is_same_object(parent, receptacle)
-            )
+            inside = self._inside(parents)
+            same = (parent for parent in inside if is_same_object(parent, receptacle))
+            self._contents[known] = frozenset(chain.from_iterable(inside[it] for it in same))
         return self._contents[known]
+
+    def _inside(self, parents: Mapping[str, str | None]) -> dict[str, list[str]]:
+        """Return what is directly in or on each parent."""
+        if id(parents) not in self._grouped:
+            placed = ((parent, key) for key, parent in parents.items() if parent is not None)
+            self._grouped[id(parents)] = grouped(placed)
+        return self._grouped[id(parents)]
 
     def is_inside(self, frame: int, item: str, receptacle: str) -> bool:
         """Return True if an object is directly in or on a receptacle (or a basin's sink)."""

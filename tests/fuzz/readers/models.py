@@ -65,7 +65,7 @@ def _policy() -> HttpPolicy:
 
 def _act(folder: Path) -> None:
     policy = _policy()
-    policy._client._send = lambda _: (folder / "reply.json").read_bytes()  # type: ignore[method-assign]
+    policy._client.send = lambda _: (folder / "reply.json").read_bytes()  # type: ignore[method-assign]
     frame = folder / "a.png"
     if not frame.exists():
         Image.new("RGB", (8, 8)).save(frame)

@@ -8,6 +8,7 @@ from functools import cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import SimpleNamespace
+from typing import Any
 
 import yaml
 
@@ -137,7 +138,8 @@ def _make_replayed(folder: Path) -> Path:
 
 
 def _continue(folder: Path) -> None:
-    replay_set(select([folder / "a.json"]), SimpleNamespace(label="embedded"), folder / "set")  # type: ignore[arg-type]
+    simulator: Any = SimpleNamespace(label="embedded", frames=None)
+    replay_set(select([folder / "a.json"]), simulator, folder / "set")
 
 
 READERS = (

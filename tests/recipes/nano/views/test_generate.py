@@ -1,6 +1,7 @@
 import math
 import random
 
+import msgspec
 import numpy as np
 import pytest
 from hypothesis import given
@@ -109,9 +110,9 @@ def test_pixels_of_cells_are_those_of_the_named_codes_in_them(codes, grid):
         for code, name in names.items()
         if code in codes
     }
-    colors = {(0, 0, code): name for code, name in names.items()}
+    colors = [{"name": name, "color": (0, 0, code)} for code, name in names.items()]
     frame = np.stack([np.zeros_like(codes), np.zeros_like(codes), codes], axis=-1)
-    cells = cell_pixels(Segmentation(frame, colors), grid)
+    cells = cell_pixels(Segmentation(frame, msgspec.Raw(msgspec.msgpack.encode(colors))), grid)
     assert {name: counts.tolist() for name, counts in cells.items()} == expected
 
 
