@@ -66,7 +66,7 @@ class ManipulationEvaluation(EpisodeEvaluation[ManipulationOptions, Manipulation
             create_actor = partial(PolicyActor, subject, blank=self.options.frames == "blank")
         else:
             raise TypeError(f"{subject} is neither a policy nor a baseline of manipulation")
-        return BoundManipulation(self, create_actor, sees=not isinstance(subject, ArmBaseline))
+        return BoundManipulation(self, create_actor, subject)
 
     def arm_simulators(self, *, image: bool) -> dict[Camera, Simulators]:
         """Return simulators with an arm for each camera of the tasks; `image` if they draw."""
@@ -101,17 +101,18 @@ class BoundManipulation(BoundEpisodes[ArmUnit, ArmRecord]):
         self,
         evaluation: ManipulationEvaluation,
         create_actor: Callable[[], ArmActor],
-        *,
-        sees: bool,
+        subject: Subject,
     ) -> None:
-        """Take the work, what creates a trajectory's actor, and whether actors look at frames."""
+        """Take the work, what creates a trajectory's actor, and the policy or baseline."""
         self._tasks = evaluation.tasks
         self._create_actor = create_actor
-        self._sees = sees
+        self._sees = not isinstance(subject, ArmBaseline)
         self._senses = evaluation.options.senses
-        self._tells_history = sees and any(task.tells_history for task in self._tasks.values())
+        # A policy of one frame is shown no history, so that none is drawn.
+        remembers = isinstance(subject, Policy)
+        self._tells_history = remembers and any(it.tells_history for it in self._tasks.values())
         self._experts = evaluation.simulators(image=self._tells_history, instances=False)
-        self._arms = evaluation.arm_simulators(image=sees)
+        self._arms = evaluation.arm_simulators(image=self._sees)
         # The episodes of all tasks by trajectory, in time order: one replay of its expert serves
         # them all.
         by_trajectory: dict[str, list[ArmUnit]] = {unit.cluster: [] for unit in evaluation.units}
