@@ -183,7 +183,8 @@ def test_a_dataset_that_changed_gives_no_pictures_and_says_so(package, run):
 
 def test_a_dataset_that_fails_today_is_told_beside_the_run_s_page(package, run):
     folder = run()[2]
-    (package / "colours.py").write_text(SUITE.replace("n: int", "other: int"))  # of another length: no stale bytecode
+    # of another length, so that no bytecode of before is taken for it
+    (package / "colours.py").write_text(SUITE.replace("n: int", "other: int"))
     sys.modules.pop("colours")
     (run_of_page,) = open_runs([folder])
     (note,) = run_of_page.presenter.timelines([run_of_page], None, ThumbnailStore(10**6)).notes
