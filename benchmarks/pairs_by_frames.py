@@ -1,5 +1,5 @@
-"""Draw docs/pairs.png: pairs of twins that the small model has right, by the number of frames that
-a memory shows it.
+"""Draw docs/pairs.png: the small model's net pairs of twins, by the number of frames that a memory
+shows it.
 
     M="--model qwen2.5-vl-nano --tasks nieh_mini_twins --out runs"
     infthor-eval $M --context memory --memory oracle,uniform,random,last --budget 27,72,180,540
@@ -21,8 +21,8 @@ PICTURE = Path(__file__).parents[1] / "docs" / "pairs.png"
 
 
 def read_points(runs: pd.DataFrame) -> pd.DataFrame:
-    """Return a row for each run behind one of the memories: frames recalled on average, and pairs
-    right with their interval, in %."""
+    """Return a row for each run behind one of the memories: frames recalled on average, and net
+    pairs with their interval, in %."""
     rows = []
     for run in runs.itertuples():
         results = msgspec.json.decode((Path(run.folder) / "results.json").read_bytes())
@@ -49,7 +49,7 @@ def draw(points: pd.DataFrame) -> plt.Figure:
     axis.minorticks_off()
     axis.set_ylim(bottom=0)
     axis.set_xlabel("frames recalled (mean)")
-    axis.set_ylabel("pairs right, %")
+    axis.set_ylabel("net pairs, %")
     axis.grid(alpha=0.3)
     axis.legend(frameon=False, fontsize=8.5)
     figure.tight_layout()
