@@ -25,8 +25,7 @@ def class_color(name: str) -> tuple[int, int, int]:
 
 def instance_image(picture: Picture) -> NDArray[np.uint8]:
     """Return the instance frame (h, w, 4) RGBA, bottom row first; walls in their class's colour."""
-    colors = [instance_color(name) if "|" in name else class_color(name) for name in picture.names]
-    return _paint(picture, colors)
+    return _paint(picture, _instance_words(picture.names))
 
 
 def class_image(picture: Picture, world: World) -> NDArray[np.uint8]:
@@ -35,16 +34,25 @@ def class_image(picture: Picture, world: World) -> NDArray[np.uint8]:
         class_color(world.objects[n].object_type if n in world.objects else n)
         for n in picture.names
     ]
-    return _paint(picture, colors)
+    return _paint(picture, _words(colors))
 
 
-def _paint(picture: Picture, colors: list[tuple[int, int, int]]) -> NDArray[np.uint8]:
-    # The void, -1, takes the last entry: black. One lookup of 32-bit words, from primitives to
-    # colours, is faster than two or than one of four bytes.
+@lru_cache(maxsize=16)
+def _instance_words(names: tuple[str, ...]) -> NDArray[np.uint32]:
+    return _words([instance_color(name) if "|" in name else class_color(name) for name in names])
+
+
+def _words(colors: list[tuple[int, int, int]]) -> NDArray[np.uint32]:
+    """Return colours as words of 32 bits, RGBA, and black for the void after them."""
     table = np.array([(*color, 255) for color in [*colors, (0, 0, 0)]], dtype=np.uint8)
-    by_instance = table.view(np.uint32).ravel()
+    return table.view(np.uint32).ravel()
+
+
+def _paint(picture: Picture, words: NDArray[np.uint32]) -> NDArray[np.uint8]:
+    # The void, -1, takes the last entry. One lookup of words, from primitives to colours, is faster
+    # than two or than one of four bytes.
     shown = picture.prims[picture.projection.index, INSTANCE].astype(int)
-    by_primitive = by_instance[np.append(shown, -1)]
+    by_primitive = words[np.append(shown, -1)]
     pixels: NDArray[np.uint32] = by_primitive[picture.nearest]
     return pixels.view(np.uint8).reshape(*pixels.shape, 4)
 

@@ -198,6 +198,7 @@ class _SceneModel:
         self._shell = shell_rows(world)
         self._state: tuple[object, ...] = ()
         self._state_around: tuple[object, ...] = ()
+        self._lit: tuple[int, Lights] | None = None
         self._all: Array = np.zeros((0, COLUMNS))
         self._names: tuple[str, ...] = ()
         self._held: Array = np.zeros((0, COLUMNS))
@@ -206,6 +207,7 @@ class _SceneModel:
         """Take another state of the same scene; no two have objects of one id and version."""
         self._world = world
         self._state = self._state_around = ()
+        self._lit = None
 
     def primitives(self) -> tuple[Array, Array, tuple[str, ...]]:
         """Return all primitives but the held object's (n, COLUMNS), its own, instances' names.
@@ -221,6 +223,11 @@ class _SceneModel:
 
     def lights(self) -> Lights:
         """Return the lamps that are on, and the daylight by the state of the light switches."""
+        if self._lit is None or self._lit[0] != self._world.version:
+            self._lit = self._world.version, self._find_lights()
+        return self._lit[1]
+
+    def _find_lights(self) -> Lights:
         lamps = []
         switches = []
         for item in self._world.objects.values():
