@@ -10,6 +10,7 @@ from lm_eval.api.instance import Instance
 from lm_eval.api.model import LM
 
 from infthor_eval.errors import ModelError, UsageError
+from infthor_eval.grouping import grouped
 from infthor_eval.harness.registration import NAME, say_model_takes_references
 from infthor_eval.harness.requests import Payload, RequestAdapter, SuiteUnit
 from infthor_eval.runs import RunHeader, Suite, UnitRecord
@@ -92,9 +93,9 @@ class InfthorLM(LM):
 
     def generate_until(self, requests: Sequence[Instance]) -> list[str]:
         """Return a response per request; empty without an answer (the journal has the reason)."""
-        numbers_of: dict[tuple[str, str], list[int]] = {}
-        for number, request in enumerate(requests):
-            numbers_of.setdefault(_suite_and_task(request), []).append(number)
+        numbers_of = grouped(
+            (_suite_and_task(request), number) for number, request in enumerate(requests)
+        )
         responses: dict[int, str] = {}
         for (suite, task), numbers in numbers_of.items():
             of_task = self._respond(

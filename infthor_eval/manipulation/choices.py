@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 import msgspec
 from msgspec import UNSET, UnsetType
 
+from infthor_eval.grouping import grouped
 from infthor_eval.manipulation.records import ArmEnded, ArmRecord
 from infthor_eval.pairs import Pairs, PairScore
 from infthor_eval.rates import Rate
@@ -65,11 +66,7 @@ def score_choices(records: Sequence[Record]) -> list[PairScore]:
 
 def _by_pair(records: Sequence[Record]) -> dict[str, list[Record]]:
     """Return the records of choices by the name of their pair."""
-    by_pair: dict[str, list[Record]] = {}
-    for record in records:
-        if record.payload.pair:
-            by_pair.setdefault(record.payload.pair, []).append(record)
-    return by_pair
+    return grouped((record.payload.pair, record) for record in records if record.payload.pair)
 
 
 def _taken(by_pair: dict[str, list[Record]]) -> Pairs[Record]:

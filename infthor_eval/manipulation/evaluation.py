@@ -13,6 +13,7 @@ from infthor_eval.episodes.simulators import Simulators
 from infthor_eval.errors import SceneError, UsageError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.trajectory import Trajectory
+from infthor_eval.grouping import grouped
 from infthor_eval.manipulation.actors import ArmActor, ArmBaseline, ArmSituation, PolicyActor
 from infthor_eval.manipulation.config import ManipulationConfig
 from infthor_eval.manipulation.environment import ArmEnvironment, ArmOutcome, Step, arm_of
@@ -130,10 +131,8 @@ class BoundManipulation(BoundEpisodes[ArmUnit, ArmRecord]):
         """See `infthor_eval.runs.BoundEvaluation.run`."""
         fingerprints, known = self._find_records(group, session)
         yield from (record for record in known.values() if record is not None)
-        by_camera: dict[Camera, list[ArmUnit]] = {}
-        for unit in group.units:
-            if known[unit.key] is None:
-                by_camera.setdefault(self._tasks[unit.key.task].settings.camera, []).append(unit)
+        asked = (unit for unit in group.units if known[unit.key] is None)
+        by_camera = grouped((self._tasks[it.key.task].settings.camera, it) for it in asked)
         for camera, units in by_camera.items():
             yield from self._run_episodes(units, fingerprints, self._arms[camera], session)
 

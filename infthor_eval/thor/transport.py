@@ -117,7 +117,7 @@ class SafeFifoServer(FifoServer):
         plain = {**metadata, "agents": [{**agent, "colors": None} for agent in agents]}
         reply = super().create_event(plain, {it: files[it] for it in files if it != _IDS})
         for event, agent in zip(reply.events, agents, strict=True):
-            event.colors = agent.get("colors")
+            event.colors = agent.get("colors", msgspec.Raw())
         for event, ids in zip(reply.events, files.get(_IDS, ()), strict=False):
             frame = read_buffer_image(ids, event.screen_width, event.screen_height)
             event.instance_segmentation_frame = frame[:, :, :3]

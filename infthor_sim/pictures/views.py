@@ -215,9 +215,10 @@ class _SceneModel:
         The held object is the active agent's.
         """
         world = self._world
-        state = (world.version, bodies_state(world))
+        bodies = bodies_state(world)
+        state = (world.version, bodies)
         if self._state != state:
-            self._rebuild((world.version_around, world.agent.held, bodies_state(world)))
+            self._rebuild((world.version_around, world.agent.held, bodies))
             self._state = state
         return self._all, self._held, self._names
 

@@ -37,6 +37,7 @@ from infthor_eval.generation.twins.final_tasks import (
     draft_final_tasks,
 )
 from infthor_eval.generation.twins.replays import MOST_MARKS
+from infthor_eval.grouping import grouped
 from infthor_eval.storage.files import file_name, is_written, write_atomically
 from infthor_eval.thor.launch import Launch
 from infthor_eval.thor.simulator import Simulator
@@ -197,9 +198,8 @@ def _require_distinct(drafts: Iterable[TwinDraft]) -> None:
 
 def _write_set(out: Path, chosen: Sequence[_ChosenQuestion]) -> None:
     """Write pairs and questions; both worlds' questions have the name of their pair."""
-    by_pair: dict[str, list[_ChosenQuestion]] = {}
-    for one in sorted(chosen, key=lambda one: (one.pair.id, one.question.text, one.ages)):
-        by_pair.setdefault(one.pair.id, []).append(one)
+    in_order = sorted(chosen, key=lambda one: (one.pair.id, one.question.text, one.ages))
+    by_pair = grouped((one.pair.id, one) for one in in_order)
     pairs: list[TwinPair] = []
     questions: list[Question] = []
     for group in by_pair.values():

@@ -18,6 +18,7 @@ from infthor_eval.errors import DataError, InfthorError, UsageError
 from infthor_eval.formats.frames import as_shown
 from infthor_eval.formats.packed.tables import HINT, LocalStore, Shards
 from infthor_eval.formats.question import WITHHELD, Question
+from infthor_eval.grouping import grouped
 from infthor_eval.nieh.contexts import DEFAULT_CONTEXT, context_named
 from infthor_eval.nieh.docs import doc_target
 from infthor_eval.nieh.prompts import question_text
@@ -79,10 +80,7 @@ def _paired(questions: "Dataset", two_worlds: bool, kind: str) -> "Dataset":
     So `--limit` of an even number takes whole pairs.
     """
     rows = questions.select_columns(["pair", "traj_id", "answer", "gt_img_idx"]).to_list()
-    by_pair: dict[str, list[int]] = {}
-    for at, row in enumerate(rows):
-        if row["pair"]:
-            by_pair.setdefault(row["pair"], []).append(at)
+    by_pair = grouped((row["pair"], at) for at, row in enumerate(rows) if row["pair"])
     if odd := [pair for pair, both in by_pair.items() if len(both) != 2]:
         raise DataError(f"pair {odd[0]!r:.60} has not two questions; {HINT}")
     traj_ids = [row["traj_id"] for row in rows]
